@@ -6,7 +6,7 @@ use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::settings::{Elements, Method, SolverSettings};
 use viscera::simulation::{Assembly, FrameError, FrameReport, Simulation, SimulationError};
-use viscera::solver::FrameReading;
+use viscera::solver::FrameReading::{Balance, Forces, State};
 use viscera::solver::gpu::{GpuError, StepCost, baseline, shortfall};
 
 /// Two bars, joined by springs; one viscous, one in an elastic fixing; a motion that lets go, a force.
@@ -390,13 +390,9 @@ fn a_frame_reads_back_what_is_shown() {
     let simulation = Simulation::<f32>::on_device(scene, assembly, crate::common::device::device());
     let mut simulation = simulation.expect("a device");
     let places = simulation.state().positions.as_ptr();
-    simulation.advance_frame().expect("a frame");
-    simulation.advance_frame().expect("a frame");
-    let gpu = simulation.gpu().expect("it is there");
-    let model = simulation.model();
-    let [forces, frame, balance] =
-        [FrameReading::Forces, FrameReading::State, FrameReading::Balance]
-            .map(|reading| gpu.bytes_of_frame(reading));
+    (0..2).for_each(|_| simulation.advance_frame().expect("a frame"));
+    let (gpu, model) = (simulation.gpu().expect("it is there"), simulation.model());
+    let [forces, frame, balance] = [Forces, State, Balance].map(|all| gpu.bytes_of_frame(all));
     let whole = gpu.bytes_of_state();
     let vertices = model.vertex_count() as u64;
     println!("{frame} bytes a frame, {balance} with a force balance, {whole} the whole state");
@@ -434,8 +430,7 @@ fn frames_that_nobody_waits_for_are_those_that_are_waited_for() {
     let mut sent = on_device();
     for frame in 0..6 {
         assert!(!sent.take_frame().expect("nothing was sent") && !sent.is_under_way());
-        let reading = if frame == 5 { FrameReading::Balance } else { FrameReading::State };
-        sent.send_frame(reading).expect("a frame");
+        sent.send_frame(if frame == 5 { Balance } else { State }).expect("a frame");
         assert!(sent.is_under_way() && sent.frame() == frame);
         arrived(&mut sent).expect("it arrives");
         assert_eq!(sent.frame(), frame + 1);
@@ -446,7 +441,7 @@ fn frames_that_nobody_waits_for_are_those_that_are_waited_for() {
     assert_eq!(sent.state(), waited.state());
     // The CPU computes at once, and its frames are taken over in the same way.
     let mut cpu = simulation(&[("solver.device", "cpu")]).expect("a simulation");
-    cpu.send_frame(FrameReading::Balance).expect("a frame");
+    cpu.send_frame(Balance).expect("a frame");
     assert_eq!(arrived(&mut cpu), Ok(0));
     cpu.measure().expect("measures");
     let other = advanced(simulation(&[("solver.device", "cpu")]).expect("a simulation"), 1);
@@ -459,13 +454,13 @@ fn a_frame_under_way_gives_way_to_a_change_and_to_the_cpu() {
     let device = own_device();
     let (scene, assembly) = assembled(&[]);
     let mut lost = Simulation::on_device(scene, assembly, &device).expect("a simulation");
-    lost.send_frame(FrameReading::State).expect("a frame");
+    lost.send_frame(State).expect("a frame");
     arrived(&mut lost).expect("it arrives");
     // A change between sending and taking over: the frame is computed again, with what was changed.
-    lost.send_frame(FrameReading::State).expect("a frame");
+    lost.send_frame(State).expect("a frame");
     lost.change(&[("world.gravity".into(), "0 m/s^2".into())]).expect("a setting");
     assert!(!lost.is_under_way() && lost.frame() == 1);
-    lost.send_frame(FrameReading::State).expect("a frame");
+    lost.send_frame(State).expect("a frame");
     device.wgpu().0.destroy();
     arrived(&mut lost).expect("computed by the CPU");
     assert_eq!(lost.frame(), 2);
@@ -485,7 +480,7 @@ fn another_device_goes_on_where_the_lost_one_was() {
     assert!(lost.is_on_device() && lost.device_choice().contains("as asked for"));
     let mut kept = advanced(with(crate::common::device::device()), 4);
     device.wgpu().0.destroy();
-    lost.send_frame(FrameReading::State).expect_err("a lost device");
+    lost.send_frame(State).expect_err("a lost device");
     lost.offer_device(Some(crate::common::device::device().clone())).expect("another device");
     assert!(lost.is_on_device() && lost.frame() == 4);
     // Multipliers are gone with the device, as after a change of settings.
