@@ -4,12 +4,15 @@ use serde_json::Value;
 use viscera::solver::gpu::kernels::texts;
 
 use crate::browser::Kind;
-use crate::page::{BAR, open};
+use crate::setup;
 
 /// It looks at more than wgpu's own does: whether it is certain that all threads of a workgroup come to a barrier.
 #[test]
 fn the_browser_compiles_every_kernel() {
-    let Some(tab) = open(Kind::Gpu, BAR) else { return };
+    let Some((tab, url)) = setup::page(Kind::Gpu) else { return };
+    // A text of the same server: nothing else keeps the device busy.
+    tab.expect("favicon.ico");
+    tab.go(&format!("{url}offline.js"));
     let device = "navigator.gpu.requestAdapter().then((adapter) => adapter.requestDevice())\
                   .then((device) => { window.compiler = device; return true; })";
     assert_eq!(tab.evaluate(device), true);
