@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
-use viscera::mesh::io::{Mesh, MeshFile, obj, vtu};
+use viscera::mesh::io::{Mesh, MeshFile, handover, obj};
 use viscera::scene::{BodyShape, Scene};
 use viscera::simulation::{Assembly, Balance};
 use viscera_import::{Fineness, Found, Import, Options, open, parts, title_of};
@@ -159,7 +159,7 @@ fn plainer(name: &str, files: &Files, is_tissue: bool) -> Option<Vec<u8>> {
         return obj::write(&surface, None).ok().map(String::into_bytes);
     }
     match file.mesh(1.0).ok()? {
-        (Mesh::Tets(mesh), report) => vtu::write_mesh(&mesh, &report.names()).ok(),
+        (Mesh::Tets(mesh), report) => handover::write(&mesh, &report.names()).ok(),
         (Mesh::Surface(_), _) => None,
     }
 }

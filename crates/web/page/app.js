@@ -232,13 +232,13 @@ export class App {
   /**
    * The first second was measured: what suits this device is set, and noted in the link. What the link came with stays.
    *
-   * @param {{choice: {device: string, method?: string | null, accuracy: string, mesh: number, why: string}, measured: any}} word
+   * @param {{choice: {device: string, accuracy: string, mesh: number, why: string}, measured: any}} word
    */
   async choose({ choice, measured }) {
     this.chosen = { ...choice, measured };
-    /** @type {[string, string | null | undefined][]} */
-    const wanted = [["solver.method", choice.method], ["solver.accuracy", choice.accuracy], ["solver.device", choice.device]];
-    const pairs = /** @type {Pair[]} */ (wanted.filter(([key, value]) => value && !this.#given.has(key)));
+    /** @type {Pair[]} */
+    const wanted = [["solver.accuracy", choice.accuracy], ["solver.device", choice.device]];
+    const pairs = wanted.filter(([key]) => !this.#given.has(key));
     const mesh = this.loaded.canChangeMesh ? choice.mesh : this.loaded.mesh;
     const link = { ...this.link, mesh, settings: this.link.settings.map((pair) => /** @type {Pair} */ ([...pair])) };
     if (mesh !== this.loaded.mesh) {
@@ -264,7 +264,7 @@ export class App {
 
   /** Measures once more, and chooses anew. */
   async measure() {
-    const chosen = new Set(["solver.device", "solver.accuracy", "solver.method"]);
+    const chosen = new Set(["solver.device", "solver.accuracy"]);
     const settings = this.link.settings.filter(([key]) => !chosen.has(key));
     this.#given = new Set(settings.map(([key]) => key));
     await this.#order({ ...this.link, settings, beside: null, mesh: null }, { again: true }, []);

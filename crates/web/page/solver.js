@@ -45,7 +45,7 @@ export function solverRows(set) {
   const one = (/** @type {string} */ key) => (/** @type {string} */ value) => set([[key, value]]);
   const method = menuRow({
     name: "method",
-    help: "Automatic takes the cheapest at the accuracy below, and XPBD on a device that is named. XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen passes, whatever the mesh. Explicit takes many small steps.",
+    help: "Automatic takes the cheapest at the accuracy below, and quasi-Newton on a device that is named. XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen passes, whatever the mesh. Explicit takes many small steps.",
     options: [["auto", "automatic"], ["quasi_newton", "quasi-Newton"], ["xpbd", "XPBD"], ["explicit", "explicit"]],
   }, one("solver.method"));
   const accuracy = menuRow({
@@ -55,7 +55,7 @@ export function solverRows(set) {
   }, one("solver.accuracy"));
   const elements = menuRow({
     name: "tetrahedra",
-    help: "Linear tetrahedra bend too little where the mesh is coarse. Recovered-gradient ones also see how their neighbours are deformed. Automatic takes these, except on a device that is named.",
+    help: "Linear tetrahedra bend too little where the mesh is coarse. Recovered-gradient ones also see how their neighbours are deformed. Automatic takes these.",
     options: [["auto", "automatic"], ["recovered", "recovered-gradient"], ["plain", "linear"]],
   }, one("solver.elements"));
   const substeps = countRows("substeps", "Divide every frame. More lose less motion to numerical damping; the cost grows alike.", "solver.substeps", [1, 100], 10, one);

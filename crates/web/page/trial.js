@@ -43,7 +43,7 @@ export class Trial {
 }
 
 /**
- * Milliseconds of a frame of XPBD on the graphics device, beside the scene that runs, which it leaves as it was.
+ * Milliseconds of a frame on the graphics device, beside the scene that runs, which it leaves as it was.
  *
  * @param {Session} session
  * @returns {Promise<number | null>} null: there is no such device, or it cannot
@@ -52,7 +52,7 @@ export async function measureGpu(session) {
   const device = JSON.parse(session.device());
   if (device.missing || device.software || session.runs() !== 1) return null;
   try {
-    session.beside(JSON.stringify([["solver.method", "xpbd"], ["solver.device", "gpu"]]));
+    session.beside(JSON.stringify([["solver.device", "gpu"]]));
     if (!JSON.parse(session.report()).runs[1].onGpu) return null;
     for (let frame = 0; frame < WARM; frame += 1) await oneFrame(session);
     const began = performance.now();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Measured {
     /// A frame on the CPU by the method that "auto" stands for [ms].
     pub cpu_ms: f64,
-    /// A frame by XPBD on the graphics processor [ms]; nothing where there is none but software.
+    /// A frame on the graphics processor by the method that "auto" stands for there [ms]; nothing where there is none but software.
     #[serde(default)]
     pub gpu_ms: Option<f64>,
     /// What a frame may cost [ms]: 16.7 for 60 a second.
@@ -27,8 +27,6 @@ fn yes() -> bool {
 pub struct Choice {
     /// "cpu" or "gpu".
     pub device: &'static str,
-    /// The method, where the device needs one that is named.
-    pub method: Option<&'static str>,
     /// "standard" or "draft".
     pub accuracy: &'static str,
     /// Factor of the element size.
@@ -58,8 +56,7 @@ const CANDIDATES: [(&str, f64); 7] = [
     ("draft", 2.5),
 ];
 
-/// The finest that keeps the frame rate. The quasi-Newton method, whose motion is nearer to the truth, comes first; a graphics
-/// processor where the CPU would need a coarser mesh. Costs are in proportion to the number of tetrahedra.
+/// The finest that keeps the frame rate; a graphics processor where the CPU would need a coarser mesh. Costs are in proportion to the number of tetrahedra.
 pub fn choose(measured: &Measured) -> Choice {
     let budget = SHARE * measured.budget_ms;
     let cost = |(accuracy, mesh): (&str, f64)| {
@@ -79,7 +76,6 @@ pub fn choose(measured: &Measured) -> Choice {
     if let Some(ms) = gpu.filter(|ms| *ms <= budget && (mesh > 1.0 || expected > budget)) {
         return Choice {
             device: "gpu",
-            method: Some("xpbd"),
             accuracy: "standard",
             mesh: 1.0,
             why: format!(
@@ -92,7 +88,6 @@ pub fn choose(measured: &Measured) -> Choice {
         if expected <= budget { "which keeps the frame rate" } else { "the coarsest there is" };
     Choice {
         device: "cpu",
-        method: None,
         accuracy,
         mesh,
         why: format!(

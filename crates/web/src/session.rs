@@ -359,8 +359,8 @@ impl Session {
         Ok(loaded.scene.text() + &state.run.done_by_hand().0)
     }
 
-    /// Sweeps, dispatches and multipliers of a frame of the first simulation, were it on a graphics processor; nothing where
-    /// none computes its method.
+    /// Sweeps, dispatches and multipliers of a frame of the first simulation by XPBD, were it on a graphics processor; nothing
+    /// where it has another method.
     pub fn frame_cost(&self) -> Option<[u64; 3]> {
         let (state, loaded) = (self.runs.first()?, self.loaded.as_ref()?);
         let settings = state.run.solver();

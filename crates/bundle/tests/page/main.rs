@@ -3,6 +3,7 @@
 mod browser;
 mod driver;
 mod hands;
+mod kernels;
 mod native;
 mod offline;
 mod page;

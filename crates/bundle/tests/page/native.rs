@@ -98,3 +98,79 @@ fn the_device_is_as_near_to_double_precision_as_a_native_one() {
         assert!(browser <= 2.0 * native, "{name}: {browser} m in the browser, {native} m natively");
     }
 }
+
+/// A soft block on a table, and a ball that is pressed into it and dragged aside. A device that is named has the quasi-Newton
+/// method, its elements and its tools; software needs seconds for a frame of it.
+const PRESSED: &str = r#"
+world = { gravity = 0 }
+solver = { device = "gpu" }
+
+[[body]]
+name = "block"
+shape = "block"
+size = ["30 mm", "30 mm", "15 mm"]
+cells = [3, 3, 2]
+material = { young = "10 kPa", poisson = 0.4 }
+
+[[fixing]]
+name = "table"
+body = "block"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+
+[[tool]]
+name = "ball"
+kind = "sphere"
+radius = "6 mm"
+friction = 0.5
+position = ["15 mm", "15 mm", "21 mm"]
+keys = [{ time = "0.05 s", translation = ["0.5 mm", 0, "-2 mm"] }]
+"#;
+
+/// Frames until the ball is where it goes.
+const PRESSED_FRAMES: u32 = 3;
+
+fn pressed(settings: &[(&str, &str)]) -> (Scene, Assembly) {
+    let scene = Scene::parse("pressed.toml", PRESSED, settings).expect("a legal scene");
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("meshes");
+    (scene, assembly)
+}
+
+/// Where vertices are [m], and the force on the tissue [N].
+fn pressed_by<S: Real>(mut simulation: Simulation<S>) -> (Vec<f64>, [f64; 3]) {
+    (0..PRESSED_FRAMES).for_each(|_| simulation.advance().expect("a frame"));
+    let force = simulation.tool_forces()[0].force.map(|component| -component);
+    (advanced(simulation, 0), force)
+}
+
+#[test]
+fn tools_on_the_device_press_as_they_do_natively() {
+    let Some(tab) = open(Kind::Gpu, crate::page::BAR) else { return };
+    let scene = serde_json::json!({ "name": "pressed.toml", "text": PRESSED, "files": {} });
+    let order = serde_json::json!({ "own": scene, "settings": [], "mesh": 1, "measure": false });
+    tab.evaluate("viscera.pause()");
+    tab.evaluate(&format!("viscera.worker.post('load', {order})"));
+    let found = in_browser(&tab, PRESSED_FRAMES);
+    let report = tab.evaluate("viscera.state().report.runs[0]");
+    let in_force = ["onGpu", "method", "elements"].map(|key| report[key].to_string());
+    assert_eq!(in_force, ["true", "\"quasi_newton\"", "\"recovered\""], "{report}");
+    let force = &report["tools"][0]["force"];
+    let force: [f64; 3] = std::array::from_fn(|axis| force[axis].as_f64().expect("a force"));
+
+    let (scene, assembly) = pressed(&[]);
+    let device = Adapter::find(None).and_then(|adapter| adapter.open()).expect("a device");
+    let native = Simulation::<f32>::on_device(scene, assembly, &device).expect("a simulation");
+    let (native, native_force) = pressed_by(native);
+    let (scene, assembly) = pressed(&[("solver.device", "cpu"), ("solver.precision", "f64")]);
+    let truth = pressed_by(Simulation::<f64>::new(scene, assembly).expect("a simulation"));
+
+    let distance = |other: &[f64]| crate::page::farthest(&truth.0, other);
+    let (browser, native) = (distance(&found), distance(&native));
+    println!("{browser:.2e} m in the browser, {native:.2e} m natively");
+    assert!(browser <= 2.0 * native, "{browser} m in the browser, {native} m natively");
+    let size =
+        |force: [f64; 3]| force.map(|component| component * component).iter().sum::<f64>().sqrt();
+    let between = size(std::array::from_fn(|axis| force[axis] - native_force[axis]));
+    println!("{force:?} N in the browser, {native_force:?} N natively, {:?} N", truth.1);
+    assert!(size(native_force) > 0.1, "the ball presses: {native_force:?} N");
+    assert!(between < 0.03 * size(native_force), "{force:?} N, natively {native_force:?} N");
+}

@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use viscera::mesh::io::{MeshNames, vtu};
+use viscera::mesh::shapes;
+
 use crate::browser::{Kind, Tab, pause};
 use crate::page::{BAR, begin, farthest, number, numbers, open, wait_for_tissue};
 use crate::setup;
@@ -127,12 +130,18 @@ fn cube() -> String {
 
 #[test]
 fn a_mesh_that_is_dropped_moves() {
-    let Some((tab, _folder)) = dropped("cube.msh", cube().as_bytes()) else { return };
-    wait_for(&tab, "cube.msh");
-    assert_eq!(tab.evaluate("viscera.state().own"), "cube.msh", "{}", said(&tab));
-    assert_eq!(tab.evaluate("viscera.state().loaded.tets"), 162);
-    tab.evaluate("viscera.frame(3)");
-    wait_for_tissue(&tab).save("own_mesh");
+    let ball = shapes::sphere(0.03, 0.012).expect("a ball").tets;
+    let file = vtu::write_mesh(&ball, &MeshNames::default()).expect("a file");
+    for (name, bytes, tets) in
+        [("cube.msh", cube().into_bytes(), 162), ("ball.vtu", file, ball.tets().len())]
+    {
+        let Some((tab, _folder)) = dropped(name, &bytes) else { return };
+        wait_for(&tab, &format!("{name} is open"));
+        assert_eq!(tab.evaluate("viscera.state().own"), name, "{}", said(&tab));
+        assert_eq!(tab.evaluate("viscera.state().loaded.tets"), tets);
+        tab.evaluate("viscera.frame(3)");
+        wait_for_tissue(&tab).save("own_mesh");
+    }
 }
 
 /// A segmented scan of 3 mm voxels as NIfTI: two balls that touch, labels without names.

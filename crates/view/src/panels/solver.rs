@@ -112,7 +112,7 @@ fn method(ui: &mut Ui, asked: Method, solver: &SolverSettings, chooser: &mut Cho
         Method::Explicit => "explicit",
         Method::QuasiNewton => "quasi_newton",
     };
-    let help = "Automatic takes the cheapest at the accuracy below, and XPBD on a device that is named. XPBD sweeps \
+    let help = "Automatic takes the cheapest at the accuracy below, and quasi-Newton on a device that is named. XPBD sweeps \
                 over constraints in large steps. Quasi-Newton solves each step in a dozen passes, whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small \
                 soft bodies.";
     let names = [
@@ -132,7 +132,7 @@ fn method(ui: &mut Ui, asked: Method, solver: &SolverSettings, chooser: &mut Cho
     }
     if solver.method != Method::Xpbd {
         let help = "Linear tetrahedra bend too little where the mesh is coarse. Recovered-gradient ones also see how their \
-                    neighbours are deformed. Automatic takes these, except on a device that is named.";
+                    neighbours are deformed. Automatic takes these.";
         let names =
             [("auto", "automatic"), ("recovered", "recovered-gradient"), ("plain", "linear")];
         let value = match solver.elements {

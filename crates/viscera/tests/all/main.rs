@@ -51,6 +51,7 @@ mod mesh;
 mod mesh_damage;
 mod mesh_formats;
 mod mesh_fuzz;
+mod mesh_handover;
 mod mesh_hostile;
 mod mesh_io;
 mod mesh_tools;

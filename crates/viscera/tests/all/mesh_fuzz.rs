@@ -7,6 +7,7 @@ use viscera::mesh::io::MeshFile;
 
 use crate::common::damage::{LARGEST_DEFLATE_RATIO, Reader};
 use crate::mesh_formats::{fixture, fixtures};
+use crate::mesh_handover;
 
 /// So many inputs of a slow test, which ends after three minutes at the latest.
 const MANY: (u64, Duration) = (250_000, Duration::from_secs(180));
@@ -226,6 +227,11 @@ fn ply_binary() -> Reader {
     Reader::new(&["binary.ply"], &[], PLY_WORDS, 1)
 }
 
+fn handover() -> Reader {
+    let words = &["\u{1}\0\0\0a", "\0\0\0\0\0\0\0\0", "\u{1b}[2J", "\u{5}\0\0\0"];
+    Reader::of(vec![mesh_handover::file()], words, 1)
+}
+
 #[test]
 fn damaged_gmsh_text_is_survived() {
     gmsh_text().survives(FEW);
@@ -389,6 +395,17 @@ fn damaged_ply_bytes_is_survived() {
 #[ignore = "slow: a quarter of a million inputs"]
 fn damaged_ply_bytes_is_survived_at_length() {
     ply_binary().survives(MANY);
+}
+
+#[test]
+fn damaged_handover_is_survived() {
+    handover().survives(FEW);
+}
+
+#[test]
+#[ignore = "slow: a quarter of a million inputs"]
+fn damaged_handover_is_survived_at_length() {
+    handover().survives(MANY);
 }
 
 /// Every fixture without what comes after every so many bytes.

@@ -225,9 +225,10 @@ impl Fault {
     }
 
     /// What only programs with the feature `formats` read.
-    pub fn not_built(found: &str) -> Self {
-        let advice = "convert it to .vtu by `viscera mesh convert`";
-        Self::whole_file(ReadProblem::Unsupported { found: found.into(), advice })
+    pub fn not_built() -> Self {
+        let found = "this format".to_owned();
+        let advice = "build with the feature `formats` of viscera, or prepare the file by the page's second module";
+        Self::whole_file(ReadProblem::Unsupported { found, advice })
     }
 
     pub fn whole_file(problem: ReadProblem) -> Self {

@@ -9,6 +9,7 @@ mod content;
 mod error;
 pub mod gltf;
 pub mod gmsh;
+pub mod handover;
 mod lines;
 mod medit;
 mod numbered;
@@ -136,9 +137,10 @@ fn read<T>(
     check_unit(unit_in_meters)
         .and_then(|()| find_kind(name, bytes))
         .and_then(|kind| match kind {
-            Kind::VtkXml => vtu::read(bytes),
+            Kind::Handover => handover::read(bytes),
             Kind::Obj => obj::read(bytes),
-            _ if !cfg!(feature = "formats") => Err(Fault::not_built("this format")),
+            _ if !cfg!(feature = "formats") => Err(Fault::not_built()),
+            Kind::VtkXml => vtu::read(bytes),
             Kind::Gmsh => gmsh::read(bytes),
             Kind::Vtk => vtk::read(bytes),
             Kind::Medit => medit::read(bytes),
@@ -181,6 +183,7 @@ fn check_unit(meters: f64) -> Result<(), Fault> {
 /// Which reader a file belongs to.
 #[derive(Clone, Copy)]
 enum Kind {
+    Handover,
     Gmsh,
     VtkXml,
     Vtk,
@@ -196,6 +199,9 @@ fn find_kind(name: &str, bytes: &[u8]) -> Result<Kind, Fault> {
     const OBJ_KEYWORDS: [&[u8]; 10] =
         [b"v", b"vn", b"vt", b"vp", b"f", b"g", b"o", b"s", b"mtllib", b"usemtl"];
 
+    if handover::is_it(bytes) {
+        return Ok(Kind::Handover);
+    }
     if bytes.starts_with(b"\x1f\x8b") || bytes.starts_with(b"PK\x03\x04") {
         return Err(unsupported("a compressed file", "unpack it first"));
     }

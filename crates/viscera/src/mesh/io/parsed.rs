@@ -43,6 +43,8 @@ pub enum Format {
     Ply,
     /// PLY, binary.
     PlyBinary,
+    /// What one module of the page hands to the other, see [`handover`](super::handover).
+    Handover,
 }
 
 impl fmt::Display for Format {
@@ -65,6 +67,7 @@ impl fmt::Display for Format {
             Self::StlBinary => "STL binary",
             Self::Ply => "PLY ASCII",
             Self::PlyBinary => "PLY binary",
+            Self::Handover => "page handover",
         })
     }
 }

@@ -109,7 +109,7 @@ pub enum GpuError {
     OnlyOnCpu,
     /// The method has no kernels for these elements.
     #[error(
-        "XPBD has no `elements = \"recovered\"`, nor has a page on a graphics processor; use `elements = \"plain\"`, `device = \"cpu\"`, or another method"
+        "XPBD has no `elements = \"recovered\"`, nor has a build without `gpu-solves` on a graphics processor; use `elements = \"plain\"`, `device = \"cpu\"`, or another method"
     )]
     PlainElements,
 }

@@ -292,13 +292,12 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
         File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
         File::Energy => guard(own(kernel_text!("../step/energy.wgsl"))),
-        // Pages are light.
         file if IS_THERE => files_of_solves(file),
         _ => Vec::new(),
     }
 }
 
-/// The files of kernels that pages leave out.
+/// The files of kernels that builds without `gpu-solves` leave out.
 fn files_of_solves(file: File) -> Vec<&'static str> {
     let own = |file| vec![file];
     let levels = kernel_text!("../quasi_newton/preconditioner/levels.wgsl");

@@ -85,7 +85,7 @@ pub(super) fn constants() -> String {
         ("MOST_HISTORY", MOST_HISTORY as u32),
         ("CLUSTER_VERTICES", CLUSTER_VERTICES as u32),
     ];
-    // Of kernels that pages leave out.
+    // Of kernels that builds without `gpu-solves` leave out.
     let of_solves = IS_THERE
         .then(|| tables::words().into_iter().chain(on_device::names()).chain(contact::names()));
     let ranges = layout::vertex_ranges().chain(of_solves.into_iter().flatten());

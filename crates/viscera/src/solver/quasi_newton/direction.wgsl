@@ -5,16 +5,24 @@
 //
 // Every workgroup judges the trial for itself. `job.set_first`: places of pairs.
 
-var<workgroup> verdict: Verdict;
+// What all threads of a workgroup go by: browsers want to see that they do, as loops with barriers go over pairs.
+struct Judged {
+    verdict: Verdict,
+    // With the one that the verdict leaves.
+    pairs: Pairs,
+}
 
-fn find_verdict(part: u32, local: u32) -> Verdict {
+var<workgroup> judged: Judged;
+
+fn judged_by_all(part: u32, local: u32) -> Judged {
     var sums: Sums;
     add_trials(part, local, &sums);
     reduce(sums, 1u, TRIAL_MAXIMA, local);
     if local == 0u {
-        verdict = judge(part, older_record());
+        let verdict = judge(part, older_record());
+        judged = Judged(verdict, pairs_with(part, older_record(), verdict.leaves_pair));
     }
-    return workgroupUniformLoad(&verdict);
+    return workgroupUniformLoad(&judged);
 }
 
 // `M g` of a vertex: its own block's, and what the lattice adds.
@@ -46,8 +54,9 @@ fn take_trial(
     if agree(!acts(part, older_record()), local) {
         return;
     }
-    let now = find_verdict(part, local);
-    let kept = pairs_with(part, older_record(), now.leaves_pair);
+    let agreed = judged_by_all(part, local);
+    let now = agreed.verdict;
+    let kept = agreed.pairs;
     let first = table[row + PIECE_FIRST];
     let end = table[row + PIECE_END];
     for (var v = first + local; v < end; v += THREADS) {
@@ -156,8 +165,9 @@ fn choose_direction(
     if agree(!acts(part, older_record()), local) {
         return;
     }
-    let now = find_verdict(part, local);
-    let kept = pairs_with(part, older_record(), now.leaves_pair);
+    let agreed = judged_by_all(part, local);
+    let now = agreed.verdict;
+    let kept = agreed.pairs;
     let count = select(0u, kept.count, now.accepted != 0u);
     for (var at_first = 0u; at_first == 0u || at_first < count; at_first += PAIRS_AT_ONCE) {
         add_up_products(part, at_first, local);

@@ -86,6 +86,11 @@ impl Reader {
             file.mesh(1.0).unwrap_or_else(|error| panic!("{error}"));
             files.push(file);
         }
+        Self::of(files, words, ratio)
+    }
+
+    /// These files alone.
+    pub fn of(files: Vec<MeshFile>, words: &'static [&'static str], ratio: usize) -> Self {
         Self { files, words, ratio }
     }
 

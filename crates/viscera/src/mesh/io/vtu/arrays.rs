@@ -103,7 +103,7 @@ impl<'a, 'input> DataArray<'a, 'input> {
                     return Err(refused(&"part of a number at the end"));
                 }
                 let number = |word: &[u8; _]| {
-                    let value = match cfg!(feature = "formats") && self.is_big_endian {
+                    let value = match self.is_big_endian {
                         true => $type::from_be_bytes(*word),
                         false => $type::from_le_bytes(*word),
                     };

@@ -51,9 +51,7 @@ impl<'a> Appended<'a> {
         let offsets = arrays.filter_map(|array| array.attribute("offset")?.trim().parse().ok());
         let mut offsets: Vec<usize> = offsets.collect();
         // Only Base64 asks where an array ends.
-        if cfg!(feature = "formats") {
-            offsets.sort_unstable();
-        }
+        offsets.sort_unstable();
         // Some arrays may be read twice.
         Self { bytes, is_base64, offsets, room: Cell::new(2 * bytes.len()) }
     }
@@ -97,9 +95,6 @@ impl<'a> Codec<'a> {
             }
         };
         let is_big_endian = root.attribute("byte_order") == Some("BigEndian");
-        if is_big_endian && !cfg!(feature = "formats") {
-            return Err(Fault::not_built("VTK data in big-endian order"));
-        }
         Ok(Self { header, is_big_endian, is_compressed, appended, lines })
     }
 
@@ -158,9 +153,6 @@ impl<'a> Codec<'a> {
             };
             return Ok((data, end));
         }
-        if !cfg!(feature = "formats") {
-            return Err(Fault::not_built("compressed VTK data"));
-        }
         let blocks = self.number(node, &bytes, 0)?;
         if blocks == 0 {
             return Ok((Cow::Borrowed(&[]), self.header));
@@ -196,7 +188,7 @@ impl<'a> Codec<'a> {
         let word = bytes.get(start..).and_then(|rest| rest.get(..self.header));
         let word = word.ok_or_else(|| cut(node))?;
         let join = |sum: u64, &byte: &u8| sum << 8 | u64::from(byte);
-        let value = match cfg!(feature = "formats") && self.is_big_endian {
+        let value = match self.is_big_endian {
             true => word.iter().fold(0, join),
             false => word.iter().rev().fold(0, join),
         };
@@ -212,9 +204,6 @@ fn cut(node: Node) -> Fault {
 
 /// Base64 in which blanks and ends may stand anywhere.
 fn decode(node: Node, text: &[u8]) -> Result<Vec<u8>, Fault> {
-    if !cfg!(feature = "formats") {
-        return Err(Fault::not_built("VTK data in Base64"));
-    }
     let text: Vec<u8> = text.iter().copied().filter(|b| !b.is_ascii_whitespace()).collect();
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
     let mut rest = &text[..];

@@ -48,7 +48,7 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     let kind = root.attribute("type").unwrap_or_default();
     let format = match kind {
         "UnstructuredGrid" => Format::Vtu,
-        "PolyData" if cfg!(feature = "formats") => Format::Vtp,
+        "PolyData" => Format::Vtp,
         _ => {
             let found = format!("a VTK file of type `{}`", shorten(kind.as_bytes()));
             let problem = ReadProblem::Unsupported { found, advice: GRID_ADVICE };

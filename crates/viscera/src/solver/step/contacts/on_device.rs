@@ -15,7 +15,7 @@ use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Vec3, vec3};
 use crate::state::ContactState;
 
-/// Whether kernels are there: pages leave them out, which are light.
+/// Whether kernels are there.
 pub const IS_THERE: bool = cfg!(feature = "gpu-solves");
 
 /// Tools, and their parts, at most: a power of two.
@@ -88,7 +88,7 @@ impl Samples {
         (IS_THERE && count > 0).then_some(Self { count: count as u32, groups })
     }
 
-    /// The same, known to be none where no kernels are: pages leave out what asks.
+    /// The same, known to be none where no kernels are: such builds leave out what asks.
     #[inline]
     pub fn known(samples: Option<Self>) -> Option<Self> {
         samples.filter(|_| IS_THERE)

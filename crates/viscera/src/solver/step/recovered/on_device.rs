@@ -56,7 +56,7 @@ struct Header {
     sums_at: u32,
 }
 
-/// Whether kernels are there: pages leave them out, which are light.
+/// Whether kernels are there.
 pub const IS_THERE: bool = cfg!(feature = "gpu-solves");
 
 /// How much there is to do.
