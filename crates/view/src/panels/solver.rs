@@ -112,9 +112,9 @@ fn method(ui: &mut Ui, asked: Method, solver: &SolverSettings, chooser: &mut Cho
         Method::Explicit => "explicit",
         Method::QuasiNewton => "quasi_newton",
     };
-    let help = "Automatic takes the cheapest at the accuracy below, and quasi-Newton on a device that is named. XPBD sweeps \
-                over constraints in large steps. Quasi-Newton solves each step in a dozen passes, whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small \
-                soft bodies.";
+    let help = "Automatic takes the cheapest at the accuracy below, and quasi-Newton on a device that is named. \
+                XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen passes, \
+                whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small soft bodies.";
     let names = [
         ("auto", "automatic"),
         ("quasi_newton", "quasi-Newton"),

@@ -395,11 +395,10 @@ fn a_frame_reads_back_what_is_shown() {
     let [forces, frame, balance] = [Forces, State, Balance].map(|all| gpu.bytes_of_frame(all));
     let whole = gpu.bytes_of_state();
     let vertices = model.vertex_count() as u64;
-    println!("{frame} bytes a frame, {balance} with a force balance, {whole} the whole state");
     assert!(forces < 64 && balance > frame + 48 * vertices, "{forces}, {balance}");
     assert!((32 * vertices..32 * vertices + 256).contains(&frame), "{frame}");
     assert!(whole > frame + 4 * simulation.layout().multiplier_count as u64 - 256, "{whole}");
-    // The caller may look at positions in the same place all the time.
+    // The caller looks at positions in the same place all the time.
     assert_eq!(simulation.state().positions.as_ptr(), places);
     // Those that stay are forces: they are there where they are asked for.
     let multipliers = gpu.multipliers(model).expect("a device");
