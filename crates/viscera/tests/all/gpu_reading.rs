@@ -82,6 +82,41 @@ fn what_is_measured_is_of_the_last_frame() {
     assert_eq!(read.report(), unread.report());
 }
 
+/// How fast a run moves is what it has moved since the frame that was read before, however many frames that is.
+#[test]
+fn speeds_are_those_between_frames_that_were_read() {
+    let text = SCENE.split("[[tool]]").next().expect("a block").replace("[5, 5, 3]", "[3, 3, 2]");
+    let settings = [("world.gravity", "9.81 m/s^2"), ("time.frame", "5 ms")];
+    let scene = Scene::parse("block.toml", &text, &settings).unwrap_or_else(|e| panic!("{e}"));
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("a block");
+    let mut run = Simulation::<f32>::on_device(scene, assembly, device()).expect("a simulation");
+    advance(&mut run, FrameReading::State, 2);
+    let before = run.state().positions.clone();
+    advance(&mut run, FrameReading::Forces, 3);
+    assert!(run.rest().is_none(), "where it is now is not known");
+    run.measure().expect("measures");
+    let ways = run.state().positions.iter().zip(&before);
+    let farthest = ways.map(|(a, b)| (a.cast::<f64>() - b.cast()).length()).fold(0.0, f64::max);
+    let rest = run.rest().expect("nothing touches it");
+    assert!((rest.speed / (farthest / 0.015) - 1.0).abs() < 1e-9 && farthest > 1e-5, "{rest:?}");
+}
+
+/// A device at hand is taken where settings mean it, not where they name another.
+#[test]
+fn a_name_is_that_of_the_device_at_hand_or_of_another() {
+    let with = |name: &str| {
+        let (scene, assembly) = parsed(&[("solver.device", name)]);
+        Simulation::<f32>::with_device(scene, assembly, device().clone())
+    };
+    let name = device().name().to_uppercase();
+    for meant in ["gpu", name.split(' ').next().expect("a word")] {
+        let run = with(meant).unwrap_or_else(|e| panic!("{meant}: {e}"));
+        assert!(run.gpu().is_some_and(|gpu| gpu.device().is_same(device())), "{meant}");
+    }
+    let error = with("abacus").expect_err("no such adapter").to_string();
+    assert!(error.contains("no adapter is called `abacus`"), "{error}");
+}
+
 /// Holds, tools and settings find the tissue where it is, not where it was read last.
 #[test]
 fn hands_find_tissue_where_it_is() {

@@ -314,7 +314,35 @@ fn is_browsers_own(description: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Adapter, GpuError};
     use super::is_browsers_own;
+
+    /// What cannot be made is an error for who wanted it, and for nobody else.
+    #[test]
+    fn a_device_goes_on_where_something_cannot_be_made() {
+        let device = Adapter::find(None).and_then(|adapter| adapter.open());
+        let device = device.unwrap_or_else(|error| panic!("{error}"));
+        let made = |size: u64| {
+            device.making(|| {
+                let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: None,
+                    size,
+                    usage: wgpu::BufferUsages::STORAGE,
+                    mapped_at_creation: false,
+                });
+                Ok(buffer.size())
+            })
+        };
+        let refused = made(device.limits().max_buffer_size + 4).expect_err("more than the limit");
+        assert!(
+            matches!(&refused, GpuError::Refused { reason, .. } if reason.len() > 20),
+            "{refused}"
+        );
+        device.check().expect("it is there");
+        assert_eq!(made(64), Ok(64));
+        let lost = device.making(|| Err::<(), _>(GpuError::OnlyOnCpu));
+        assert_eq!(lost, Err(GpuError::OnlyOnCpu));
+    }
 
     #[test]
     fn a_picture_that_the_browser_lost_is_no_misuse() {
