@@ -68,7 +68,6 @@ impl<S: Real> Simulation<S> {
         match computed {
             Err(lost) if self.backend.gives_way_after(&lost) => {
                 // Positions are still those that were read last; the multipliers are gone with the device.
-                self.unread = 0;
                 let (time, dt) = (self.time(), self.substep_dt());
                 self.backend.give_way(&self.model, &self.solver, time, &lost);
                 let inputs = self.inputs_at(time);

@@ -121,7 +121,8 @@ fn a_name_is_that_of_the_device_at_hand_or_of_another() {
 #[test]
 fn hands_find_tissue_where_it_is() {
     let [mut read, mut unread] = both();
-    let tray = "[[tool]]\nname = \"probe\"\nkind = \"sphere\"\nradius = \"5 mm\"\n";
+    // As thick as the ball or thicker: the surface's samples stay.
+    let tray = "[[tool]]\nname = \"probe\"\nkind = \"sphere\"\nradius = \"7 mm\"\n";
     let mut probe = read_tray("tray.toml", tray).unwrap_or_else(|e| panic!("{e}")).remove(0);
     probe.placement.translation = vec3(0.006, 0.006, 0.024);
     let patch = Patch {
@@ -140,6 +141,8 @@ fn hands_find_tissue_where_it_is() {
         run.take_tool(probe.clone()).expect("a probe");
         advance(run, reading, 2);
         run.let_go(hold).expect("it is held");
+        advance(run, reading, 1);
+        run.put_away(1).expect("the probe");
         advance(run, reading, 1);
         run.change(&setting("world.gravity", "9.81 m/s^2")).expect("a setting");
         advance(run, reading, 2);
