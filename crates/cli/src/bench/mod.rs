@@ -115,7 +115,7 @@ const ASKED: &str = "\
 Questions and their answers. Soft tissue of 10 kPa; Poisson's ratio is 0.3 in frames and in steps of 1/1000 s, 0.45 in \
 the first three, which are as published. A bar held at one end hangs, and of the quasi-Newton method swings, in steps of 1/1000 s with a wave along it. Steps are \
 those of a frame, in as many substeps as are chosen for an error of motion of 5 %; passes are iterations of each solve, sweeps of a step or its small \
-steps; unused are those of the last solve whose steps were round-off. The tool of one question is a ball that the bar comes to lie on. \
+steps; unused are those of the last solve whose steps were round-off. The tool of one question is a plate below the middle of the bar. \
 Where something is read back the time is the host's, the median, from sending a step to having what was read. The error left is that of \
 one step against the same step solved to the end in double precision on the processor, as a share of the error of \
 inertia alone.";

@@ -106,7 +106,7 @@ pub fn hanging<S: Real>(mesh: &TetMesh) -> Inputs<S> {
     Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), pins, ..Inputs::default() }
 }
 
-/// A ball that the middle of what hangs comes to lie on: from below, with its top a hundredth of the length inside.
+/// A plate under the middle of what hangs, within the thickness of contact: wide enough to meet samples of the coarsest mesh.
 pub fn supporting(mesh: &TetMesh) -> Tool {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for x in mesh.vertices().iter().map(|x| x.to_array()) {
@@ -117,10 +117,12 @@ pub fn supporting(mesh: &TetMesh) -> Tool {
     }
     let [low, high] = bounds.map(Vec3::from_f64);
     let (middle, size) = ((low + high) * 0.5, high - low);
-    let radius = 0.25 * size.y;
-    let mut ball = Tool::new(Shape::Sphere { radius });
-    ball.pose.translation = Vec3 { z: low.z + 0.01 * size.x - radius, ..middle };
-    ball
+    let radius = 0.05 * size.z;
+    let half = Vec3 { x: 0.15 * size.x, y: 0.3 * size.y, z: 0.05 * size.z };
+    let mut plate = Tool::new(Shape::RoundedBox { half, radius });
+    let below = 0.5 * plate.law.thickness + half.z;
+    plate.pose.translation = Vec3 { z: low.z - below, ..middle };
+    plate
 }
 
 #[cfg(test)]

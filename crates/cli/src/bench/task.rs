@@ -34,7 +34,7 @@ pub enum ReadBack {
     Positions,
     /// The force balance, by which the forces of fixings are known.
     Forces,
-    /// The force on a tool on which the tissue lies, and nothing else.
+    /// The force on a tool that tissue meets, and nothing else.
     Tool,
 }
 

@@ -267,7 +267,7 @@ fn a_graphics_processor_is_measured_beside_the_processor_at_length() {
 /// Those that are alike once, each with its bytes.
 #[cfg(feature = "gpu")]
 fn assert_is_counted(counted: &[Value]) {
-    assert_eq!(counted.len(), 10);
+    assert_eq!(counted.len(), 11);
     for step in counted {
         let of = |key: &str| step[key].as_f64().unwrap_or(0.0);
         assert!(
@@ -317,6 +317,7 @@ fn questions_are_answered_beside_their_aims() {
         ("explicit-recovered", None),
         ("quasi-newton", Some(0.3e-3)),
         ("quasi-newton", Some(0.3e-3)),
+        ("quasi-newton", Some(0.3e-3)),
         ("quasi-newton", Some(3e-3)),
         ("exact", None),
         ("explicit", None),
@@ -344,6 +345,9 @@ fn questions_are_answered_beside_their_aims() {
     assert_eq!(explicit["pass_dispatches"], 2);
     let small_steps = explicit["passes"].as_u64().expect("small steps");
     assert!(explicit["dispatches"].as_u64() > Some(2 * small_steps), "{explicit}");
+    // A tool adds what finds its contacts, what ends them, and its report.
+    let [balance, tool] = [10, 11].map(|i| frames[i]["dispatches"].as_u64());
+    assert_eq!((&frames[11]["read_back"], tool), (&Value::from("tool"), balance.map(|d| d + 3)));
     let counted = results["traffic"].as_array().expect("traffic");
     assert_is_counted(counted);
     assert_eq!(counted[7]["passes"], explicit["passes"]);

@@ -44,6 +44,8 @@ pub struct Worker {
     due: Instant,
     /// When frames were measured last.
     measured: Option<Instant>,
+    /// Whether that was the last one.
+    was_due: bool,
     /// When the window asked for positions last.
     looked: Option<Instant>,
     /// Solvers by which steps are repeated, the thread that does so, and when it was begun last.
@@ -119,6 +121,7 @@ impl Worker {
             coloring: Coloring::default(),
             due: Instant::now(),
             measured: None,
+            was_due: false,
             probed: Vec::new(),
             prober,
             probed_last: None,

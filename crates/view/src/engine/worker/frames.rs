@@ -63,10 +63,13 @@ impl Worker {
     fn is_measured(&mut self) -> bool {
         let colors = matches!(self.coloring, Coloring::Strain | Coloring::Stress);
         let long_ago = self.measured.is_none_or(|since| since.elapsed() > MEASURED_EVERY);
-        if long_ago || !self.playing {
+        // Of frames that take longer than that, every other one.
+        let is_due = long_ago && !self.was_due || !self.playing;
+        self.was_due = is_due;
+        if is_due {
             self.measured = Some(Instant::now());
         }
-        colors || long_ago || !self.playing
+        colors || is_due
     }
 
     pub(super) fn publish(&mut self) {
