@@ -282,20 +282,8 @@ fn assert_is_counted(counted: &[Value]) {
 #[cfg(feature = "gpu")]
 fn questions_are_answered_beside_their_aims() {
     let folder = Bench::new("");
-    let end = folder.end_of(&[
-        "bench",
-        "--device",
-        "gpu",
-        "--questions",
-        "--sizes",
-        "100",
-        "--seconds",
-        "0",
-        "--threads",
-        "1",
-        "--out",
-        "out",
-    ]);
+    let line = "bench --device gpu --questions --sizes 100 --seconds 0 --threads 1 --out out";
+    let end = folder.end_of(&line.split(' ').collect::<Vec<_>>());
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let results: Value = serde_json::from_slice(&folder.read("out/bench.json")).expect("JSON");
     let answers = results["answers"].as_array().expect("answers");
