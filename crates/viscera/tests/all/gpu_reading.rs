@@ -154,6 +154,49 @@ fn hands_find_tissue_where_it_is() {
     assert_eq!(read.live(), unread.live());
 }
 
+/// A change builds the solver anew and restarts it, which takes over nothing of what acts on vertices: the next step does.
+#[test]
+fn loads_and_holds_act_after_a_change() {
+    let block = SCENE.split("[[tool]]").next().expect("a block").replace("[5, 5, 3]", "[3, 3, 2]");
+    let text = block
+        + r#"
+        stiffness = "2 N/mm"
+
+        [[force]]
+        name = "pull"
+        body = "block"
+        half_space = { point = [0, 0, "15 mm"], normal = [0, 0, 1] }
+        force = ["0.2 N", 0, "0.5 N"]
+    "#;
+    for method in ["quasi_newton", "explicit", "xpbd"] {
+        let settings = [("time.frame", "5 ms"), ("solver.method", method)];
+        let parsed = || {
+            let scene = Scene::parse("block.toml", &text, &settings);
+            let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+            let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned()));
+            (scene, assembly.expect("a block"))
+        };
+        let (scene, assembly) = parsed();
+        let there = Simulation::<f32>::on_device(scene, assembly, device());
+        let (scene, assembly) = parsed();
+        let mut runs = [there, Simulation::new(scene, assembly)].map(|run| run.expect("a run"));
+        for run in &mut runs {
+            advance(run, FrameReading::State, 1);
+            run.change(&setting("solver.threads", "1")).expect("a setting");
+            advance(run, FrameReading::State, 4);
+        }
+        let [there, here] = runs.each_ref().map(|run| &run.state().positions);
+        let largest = |a: &[Vec3<f32>], b: &[Vec3<f32>]| {
+            let far = a.iter().zip(b).map(|(a, b)| (*a - *b).length());
+            far.fold(0.0, f32::max)
+        };
+        let (apart, moved) = (largest(there, here), largest(here, &runs[0].model().rest_positions));
+        println!("{method}: {apart} m of {moved} m");
+        // Passes of either end within the accuracy of the method.
+        assert!(moved > 1e-3 && apart < 0.02 * moved, "{method}: {apart} m of {moved} m");
+    }
+}
+
 /// Without waiting as well: what was asked for is what there is.
 #[test]
 fn frames_that_nobody_waits_for_may_stay_as_well() {

@@ -22,6 +22,8 @@ impl GpuSolver {
         self.prepare_step(model, inputs, dt);
         self.outgoing.pass("restart", &self.uniforms.all, &[&self.restart], Marks::default());
         self.outgoing.submit();
+        // Not every method takes over here what acts on vertices: the next step sends all of it.
+        self.updates.clear();
         self.forget_pairs();
         self.multiplier_dt = dt * self.solve_share();
         Ok(())
