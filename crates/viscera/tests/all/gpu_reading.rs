@@ -170,21 +170,20 @@ fn loads_and_holds_act_after_a_change() {
     "#;
     for method in ["quasi_newton", "explicit", "xpbd"] {
         let settings = [("time.frame", "5 ms"), ("solver.method", method)];
-        let parsed = || {
+        // Threads change nothing on a device but that it begins anew.
+        let runs = [true, false].map(|changes| {
             let scene = Scene::parse("block.toml", &text, &settings);
             let scene = scene.unwrap_or_else(|e| panic!("{e}"));
             let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned()));
-            (scene, assembly.expect("a block"))
-        };
-        let (scene, assembly) = parsed();
-        let there = Simulation::<f32>::on_device(scene, assembly, device());
-        let (scene, assembly) = parsed();
-        let mut runs = [there, Simulation::new(scene, assembly)].map(|run| run.expect("a run"));
-        for run in &mut runs {
-            advance(run, FrameReading::State, 1);
-            run.change(&setting("solver.threads", "1")).expect("a setting");
-            advance(run, FrameReading::State, 4);
-        }
+            let run = Simulation::<f32>::on_device(scene, assembly.expect("a block"), device());
+            let mut run = run.expect("a simulation");
+            advance(&mut run, FrameReading::State, 1);
+            if changes {
+                run.change(&setting("solver.threads", "1")).expect("a setting");
+            }
+            advance(&mut run, FrameReading::State, 4);
+            run
+        });
         let [there, here] = runs.each_ref().map(|run| &run.state().positions);
         let largest = |a: &[Vec3<f32>], b: &[Vec3<f32>]| {
             let far = a.iter().zip(b).map(|(a, b)| (*a - *b).length());
@@ -192,8 +191,8 @@ fn loads_and_holds_act_after_a_change() {
         };
         let (apart, moved) = (largest(there, here), largest(here, &runs[0].model().rest_positions));
         println!("{method}: {apart} m of {moved} m");
-        // Passes of either end within the accuracy of the method.
-        assert!(moved > 1e-3 && apart < 0.02 * moved, "{method}: {apart} m of {moved} m");
+        // Within the accuracy of the method: what solves have learned is forgotten.
+        assert!(moved > 1e-3 && apart < 0.01 * moved, "{method}: {apart} m of {moved} m");
     }
 }
 
