@@ -1,10 +1,9 @@
 //! The textures that a picture is drawn into, and the way back.
 
-use std::sync::mpsc;
-
 use viscera::solver::gpu::Device;
 use viscera_picture::{Image, ImageSize};
 
+use crate::buffers::{read, readable};
 use crate::error::RenderError;
 
 /// Colours as screens take them, encoded by the shaders: windows show such a texture as it is.
@@ -95,16 +94,10 @@ impl Target {
 
     /// Waits for the device and reads the picture.
     pub fn read(&self, device: &Device) -> Result<Image, RenderError> {
-        let (wgpu, queue) = device.wgpu();
         let (width, height) = (self.size.width(), self.size.height());
         let row = (4 * width).next_multiple_of(ROW);
-        let copy = wgpu.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            size: u64::from(row) * u64::from(height),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = wgpu.create_command_encoder(&Default::default());
+        let copy = readable(device, "picture", u64::from(row) * u64::from(height));
+        let mut encoder = device.wgpu().0.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
             self.color.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
@@ -117,24 +110,15 @@ impl Target {
             },
             self.color.size(),
         );
-        queue.submit([encoder.finish()]);
+        let pixels = read(device, encoder, &copy, |bytes| {
+            let mut pixels = Vec::with_capacity((width * height) as usize);
+            for row in bytes.chunks(row as usize) {
+                let texels = row.as_chunks::<4>().0.iter().take(width as usize);
+                pixels.extend(texels.map(|[r, g, b, _]| [*r, *g, *b]));
+            }
+            pixels
+        })?;
         let lost = || RenderError::Lost { name: device.name().to_owned() };
-        let (sender, receiver) = mpsc::channel();
-        copy.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // Nobody listens where waiting has failed.
-            let _ = sender.send(result.is_ok());
-        });
-        let waited = wgpu.poll(wgpu::PollType::wait_indefinitely());
-        device.check()?;
-        if waited.is_err() || !receiver.try_recv().unwrap_or(false) {
-            return Err(lost());
-        }
-        let bytes = copy.slice(..).get_mapped_range().map_err(|_| lost())?;
-        let mut pixels = Vec::with_capacity((width * height) as usize);
-        for row in bytes.chunks(row as usize) {
-            let texels = row.as_chunks::<4>().0.iter().take(width as usize);
-            pixels.extend(texels.map(|[r, g, b, _]| [*r, *g, *b]));
-        }
         Image::from_pixels(self.size, pixels).ok_or_else(lost)
     }
 }

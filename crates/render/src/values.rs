@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use viscera::solver::gpu::Device;
 use viscera_picture::map_color;
 
+use crate::buffers::{read, readable};
 use crate::error::RenderError;
 
 /// A value as shaders have it.
@@ -30,7 +31,7 @@ impl Value {
 /// One value for each vertex of a surface.
 #[derive(Debug)]
 pub struct ValueBuffer {
-    queue: wgpu::Queue,
+    device: Device,
     buffer: wgpu::Buffer,
     count: usize,
 }
@@ -38,14 +39,17 @@ pub struct ValueBuffer {
 impl ValueBuffer {
     /// Zeros, for a surface of so many vertices.
     pub fn new(device: &Device, count: usize) -> Self {
-        let (wgpu, queue) = device.wgpu();
+        let (wgpu, _) = device.wgpu();
         let buffer = wgpu.create_buffer(&wgpu::BufferDescriptor {
             label: Some("values"),
             size: (size_of::<Value>() * count.max(1)) as u64,
-            usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+            usage: wgpu::BufferUsages::VERTEX
+                | wgpu::BufferUsages::COPY_DST
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::STORAGE,
             mapped_at_creation: false,
         });
-        Self { queue: queue.clone(), buffer, count }
+        Self { device: device.clone(), buffer, count }
     }
 
     /// Takes over values of the surface's vertices, for pictures drawn from now on; NaN is drawn grey.
@@ -55,8 +59,20 @@ impl ValueBuffer {
             return Err(RenderError::ValueCount { found, expected });
         }
         let values: Vec<Value> = values.iter().copied().map(Value::of).collect();
-        self.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&values));
+        self.device.wgpu().1.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&values));
         Ok(())
+    }
+
+    /// Waits for the device and reads the values, of which NaN is none.
+    pub fn read(&self) -> Result<Vec<f32>, RenderError> {
+        let copy = readable(&self.device, "values", self.buffer.size());
+        let mut encoder = self.device.wgpu().0.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.buffer, 0, &copy, 0, copy.size());
+        read(&self.device, encoder, &copy, |bytes| {
+            let all: &[Value] = bytemuck::cast_slice(bytes);
+            let value = |own: &Value| if own.missing > 0.0 { f32::NAN } else { own.value };
+            all.iter().take(self.count).map(value).collect()
+        })
     }
 
     /// How many values there are.
@@ -64,7 +80,8 @@ impl ValueBuffer {
         self.count
     }
 
-    pub(crate) fn buffer(&self) -> &wgpu::Buffer {
+    /// Two floats a vertex: the value, and one where there is none. For kernels that write them.
+    pub fn buffer(&self) -> &wgpu::Buffer {
         &self.buffer
     }
 

@@ -46,23 +46,26 @@ impl RunSurface {
     /// Moves it to its place in a snapshot: by positions that are on the device already, where there are any.
     pub fn place(&mut self, run: &RunSnapshot, assembly: &Assembly) -> Result<(), String> {
         let text = |error: GpuError| error.to_string();
+        let mut shown = false;
         match run.on_device.as_ref().filter(|there| there.device().is_same(&self.device)) {
             Some(there) => {
                 if !self.surface.follows(there) {
                     self.surface = bound(&self.device, assembly, Some(there))?;
                 }
                 self.surface.place_copy(there).map_err(text)?;
+                self.surface.update();
+                shown = self.surface.show_values(there, self.values.buffer()).map_err(text)?;
             }
             None => {
                 if self.surface.follows_copies() {
                     self.surface = bound(&self.device, assembly, None)?;
                 }
                 self.surface.place(&run.positions).map_err(text)?;
+                self.surface.update();
             }
         }
-        self.surface.update();
-        self.has_values = !run.values.is_empty();
-        if self.has_values {
+        self.has_values = shown || !run.values.is_empty();
+        if self.has_values && !shown {
             self.values.write(&run.values).map_err(|error| error.to_string())?;
         }
         self.tools.follow(&self.device, &run.tools, self.at_rest);
@@ -185,11 +188,15 @@ fn one_of<'a>(body: &BodyColor, all: &BodyView<'a>) -> BodyView<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::surface_values;
     use crate::run::build;
     use crate::snapshot::Coloring;
+    use viscera::measure::measure_tets;
+    use viscera::scalar::vec3;
     use viscera::scene::Scene;
     use viscera::solver::FrameReading;
-    use viscera::solver::gpu::Adapter;
+    use viscera::solver::gpu::{Adapter, GpuSolver};
+    use viscera::state::State;
 
     /// Whatever was read last, a picture shows the frame that it is of.
     #[test]
@@ -232,11 +239,85 @@ mod tests {
         run.fill(Coloring::Plain, Some(&device), &mut snapshot);
         surface.place(&snapshot, &assembly).expect("a place");
         assert!(places(&surface) == all[2]);
-        // Colours that need positions, and other devices, read them.
+        // Other devices read them, and where samples are not there pressures come from the host.
         let other = Adapter::find(None).and_then(|adapter| adapter.open()).expect("a device");
-        assert!(!run.is_drawn_unread(&device, Coloring::Displacement));
+        assert!(run.is_drawn_unread(&device, Coloring::Stress));
+        assert!(!run.is_drawn_unread(&device, Coloring::Pressure));
         assert!(!run.is_drawn_unread(&other, Coloring::Plain));
         run.fill(Coloring::Plain, Some(&other), &mut snapshot);
         assert!(snapshot.on_device.is_none());
+    }
+    /// Colours of a frame that stays on the device are those that the host finds in double precision: of both laws, of tissue that
+    /// is stretched and sheared at random, and none around a tetrahedron that is inside out.
+    #[test]
+    fn colours_of_frames_that_stay_are_the_hosts() {
+        let text = r#"
+            [solver]
+            device = "gpu"
+            method = "xpbd"
+            [[body]]
+            name = "slab"
+            shape = "block"
+            size = ["30 mm", "30 mm", "20 mm"]
+            cells = [3, 3, 2]
+            material = { young = "10 kPa", poisson = 0.45 }
+            [[body]]
+            name = "bar"
+            shape = "block"
+            size = ["30 mm", "10 mm", "10 mm"]
+            position = ["1 m", 0, 0]
+            cells = [3, 1, 1]
+            material = { young = "3 kPa", poisson = 0.3, model = "saint_venant_kirchhoff" }
+        "#;
+        let device = Adapter::find(None).and_then(|adapter| adapter.open()).expect("a device");
+        let scene = Scene::parse("slab.toml", text, &[]).expect("a legal scene");
+        let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("a slab");
+        let model = assembly.builder.build::<f32>().expect("a model");
+        let mut state = State::at_rest(&model);
+        let mut solver = GpuSolver::new(&device, &model, &scene.solver).expect("a solver");
+        // Up to a millimetre of cells of ten, and one vertex through the opposite side of its own.
+        let mut seed = 7u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        for x in &mut state.positions {
+            *x += vec3(random(), random(), random()) * 1e-3;
+        }
+        state.positions[0] += vec3(0.02, 0.02, 0.02);
+        solver.write(&model, &state).expect("a state");
+        let mut tets = Vec::new();
+        measure_tets(&model, &state.positions, &mut tets);
+        assert!(tets.iter().any(|tet| tet.is_inverted()));
+        let mut surface = RunSurface::new(&device, &assembly).expect("a surface");
+        for coloring in [Coloring::Displacement, Coloring::Strain, Coloring::Stress] {
+            let value = coloring.of_tissue();
+            let on_device = Some(solver.copy_positions(None, value));
+            let snapshot = RunSnapshot { on_device, unread: 1, ..RunSnapshot::default() };
+            surface.place(&snapshot, &assembly).expect("a place");
+            let mut expected = Vec::new();
+            surface_values(&assembly, coloring, &state.positions, &tets, &[], &mut expected);
+            let found = surface.values.read().expect("a device");
+            assert!(surface.has_values && found.len() == expected.len());
+            let known = expected.iter().filter(|value| value.is_finite());
+            assert!(known.filter(|value| **value > 0.0).count() > expected.len() / 2);
+            let gaps = expected.iter().filter(|value| value.is_nan()).count();
+            assert!((gaps > 0) == (coloring != Coloring::Displacement), "{gaps}");
+            // Places a metre away are rounded to 6e-8 m, and edges are some millimetres: 2e-5 of strain and of moduli.
+            let floor = match coloring {
+                Coloring::Displacement => 2e-7,
+                Coloring::Strain => 1e-4,
+                _ => 1e-4 * 5e4,
+            };
+            for (found, expected) in found.iter().zip(&expected) {
+                let is_it = (found - expected).abs() <= 1e-3 * expected.abs() + floor;
+                assert!(is_it || (found.is_nan() && expected.is_nan()), "{found} for {expected}");
+            }
+        }
+        // Plain tissue has none.
+        let on_device = Some(solver.copy_positions(None, None));
+        let plain = RunSnapshot { on_device, ..RunSnapshot::default() };
+        surface.place(&plain, &assembly).expect("a place");
+        assert!(!surface.has_values);
     }
 }

@@ -1,5 +1,7 @@
 //! A simulation in either precision, with the caller's numbers for the patches that it holds.
 
+use std::borrow::Cow;
+
 use viscera::model::ModelBuilder;
 use viscera::record::{RecordedFile, Recorder};
 use viscera::scalar::{Real, Vec3};
@@ -8,7 +10,7 @@ use viscera::settings::{Place, Precision, SolverSettings};
 use viscera::simulation::{
     Assembly, PatchForce, PatchKind, ResolvedPatch, Simulation, SimulationError,
 };
-use viscera::solver::gpu::Device;
+use viscera::solver::gpu::{Device, GpuSolver};
 use viscera::solver::{FrameReading, Inputs};
 
 use crate::color::surface_values;
@@ -291,11 +293,12 @@ impl<S: Real> Run for SimulationRun<S> {
 
     fn is_drawn_unread(&self, device: &Device, coloring: Coloring) -> bool {
         let is_there = self.simulation.gpu().is_some_and(|gpu| gpu.device().is_same(device));
-        let is_plain = matches!(coloring, Coloring::Plain | Coloring::Bodies);
+        let shows = |gpu: &GpuSolver| coloring.of_tissue().is_none_or(|value| gpu.shows(value));
+        let is_shown = self.simulation.gpu().is_some_and(shows);
         // Patches that move have marks where they are.
         let assembly = self.simulation.assembly();
         let moves = self.simulation.first_hold() > 0 || !assembly.forces.is_empty();
-        is_there && is_plain && self.held.is_empty() && !moves && self.recorder.is_none()
+        is_there && is_shown && self.held.is_empty() && !moves && self.recorder.is_none()
     }
 
     fn offer(&mut self, device: Option<&Device>) -> Result<(), String> {
@@ -328,7 +331,7 @@ impl<S: Real> Run for SimulationRun<S> {
         let drawn =
             self.simulation.gpu().filter(|gpu| device.is_some_and(|d| gpu.device().is_same(d)));
         let kept = snapshot.on_device.take();
-        snapshot.on_device = drawn.map(|gpu| gpu.copy_positions(kept));
+        snapshot.on_device = drawn.map(|gpu| gpu.copy_positions(kept, coloring.of_tissue()));
         snapshot.unread = self.simulation.unread_frames();
         let positions = &self.simulation.state().positions;
         snapshot.positions.clear();
@@ -345,14 +348,21 @@ impl<S: Real> Run for SimulationRun<S> {
         tools_of(&self.simulation, &self.hands, &mut snapshot.tools);
         snapshot.ledger = self.simulation.ledger();
         let assembly = self.simulation.assembly();
+        if snapshot.unread > 0 {
+            snapshot.values.clear();
+            return;
+        }
         let tets = match coloring {
             Coloring::Strain | Coloring::Stress => self.simulation.tets(),
             Coloring::Plain | Coloring::Bodies | Coloring::Displacement | Coloring::Pressure => {
                 Vec::new()
             }
         };
-        let touches = &self.simulation.state().contact.touches;
-        surface_values(assembly, coloring, positions, &tets, touches, &mut snapshot.values);
+        let touches = match coloring {
+            Coloring::Pressure => self.simulation.touches(),
+            _ => Cow::default(),
+        };
+        surface_values(assembly, coloring, positions, &tets, &touches, &mut snapshot.values);
     }
 
     fn done_by_hand(&self) -> (String, f64) {

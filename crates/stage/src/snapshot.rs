@@ -3,7 +3,7 @@
 use viscera::measure::Energies;
 use viscera::scalar::Vec3;
 use viscera::solver::Ledger;
-use viscera::solver::gpu::DevicePositions;
+use viscera::solver::gpu::{DevicePositions, TissueValue};
 
 use crate::tools::ToolSnapshot;
 
@@ -28,6 +28,19 @@ pub enum Coloring {
     Pressure,
 }
 
+impl Coloring {
+    /// What a device finds for it.
+    pub fn of_tissue(self) -> Option<TissueValue> {
+        match self {
+            Self::Plain | Self::Bodies => None,
+            Self::Displacement => Some(TissueValue::Displacement),
+            Self::Strain => Some(TissueValue::Strain),
+            Self::Stress => Some(TissueValue::Stress),
+            Self::Pressure => Some(TissueValue::Pressure),
+        }
+    }
+}
+
 /// The state of one simulation at that time.
 #[derive(Debug, Default)]
 pub struct RunSnapshot {
@@ -37,7 +50,8 @@ pub struct RunSnapshot {
     pub unread: u64,
     /// Those of this frame, where the device that draws has computed them.
     pub on_device: Option<DevicePositions>,
-    /// Values of the surfaces' vertices, one body after the other; empty for plain tissue.
+    /// Values of the surfaces' vertices, one body after the other; empty for plain tissue, and while positions are unread: the
+    /// device that draws has them.
     pub values: Vec<f32>,
     /// Patches held by hand.
     pub held: Vec<HeldPatch>,

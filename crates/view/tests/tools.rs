@@ -13,7 +13,7 @@ use viscera::scalar::rigid::RigidTransform;
 use viscera::scene::Scene;
 use viscera::simulation::{Assembly, Simulation};
 use viscera::solver::FrameReading;
-use viscera_stage::ToolAct;
+use viscera_stage::{Coloring, ToolAct};
 use viscera_view::app::App;
 use viscera_view::controller::{News, Sticks};
 use viscera_view::curves::Source;
@@ -74,6 +74,14 @@ const ON_DEVICE: &[(&str, &str)] = &[
     ("body.tissue.cells", "[8, 4, 2]"),
 ];
 
+/// Colours of values by their names.
+const COLORS: [(&str, Coloring); 4] = [
+    ("displacement", Coloring::Displacement),
+    ("strain", Coloring::Strain),
+    ("contact", Coloring::Pressure),
+    ("stress", Coloring::Stress),
+];
+
 /// The picture after so many frames from the beginning, one by one.
 fn stepped(window: &mut Window, frames: u64) -> Vec<[u8; 3]> {
     window.press("Pause");
@@ -105,6 +113,19 @@ fn tissue_that_stays_on_the_device_is_seen_and_taken() {
     assert!(window.run(0).ledger.is_none());
     assert!(window.harness.query_by_label_contains("work of tools").is_none());
     window.picture("stays-on-the-device");
+    for (label, coloring) in COLORS {
+        let [expected, found] = [&mut apart, &mut window].map(|window| {
+            window.press(label);
+            let is_shown = |app: &App| app.snapshot().is_some_and(|s| s.coloring == coloring);
+            window.wait("its colours", is_shown);
+            window.pixels()
+        });
+        window.picture(&format!("stays-{label}"));
+        // Colours are steps of values, and values of both sides are rounded.
+        let differs = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|i| a[i].abs_diff(b[i]) > 4);
+        let count = expected.iter().zip(&found).filter(differs).count();
+        assert!(count * 1000 < found.len(), "{label}: {count} of {} pixels", found.len());
+    }
 
     // While it runs, most frames are not read; a press is answered once positions are known.
     window.press("Run");

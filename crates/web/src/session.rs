@@ -300,7 +300,11 @@ impl Session {
         }
         let [wanted, ..] = state.measures;
         state.measures = [false, wanted, state.measures[2]];
-        let reading = if wanted { FrameReading::Balance } else { FrameReading::State };
+        // What tools touch comes with the balance.
+        let reading = match wanted || self.coloring == Coloring::Pressure {
+            true => FrameReading::Balance,
+            false => FrameReading::State,
+        };
         let sent = state.run.send(reading);
         self.unless_lost(sent)?;
         self.take_over(run).map(|_| ())

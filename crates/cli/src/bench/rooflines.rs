@@ -35,12 +35,7 @@ pub fn answers(answers: &[Answer]) -> Option<Table> {
     ]);
     for answer in answers {
         let on = answer.threads.map_or("GPU".into(), |n| format!("CPU, {}", threads(n as u32)));
-        let size = |tets: usize| tets.to_string();
-        let tets = if answer.is_asked_size() {
-            size(answer.tets)
-        } else {
-            format!("{} for {}", size(answer.tets), size(answer.asked_tets))
-        };
+        let tets = measured_tets(answer);
         let aims = &answer.aims;
         let unused = answer.unused_passes.filter(|&count| count > 0);
         let unused = unused.map_or(String::new(), |count| format!(", {count} unused"));
@@ -187,6 +182,14 @@ pub fn roofline_plot(
     plot
 }
 
+/// How many tetrahedra an answer is of, and for how many where it was asked for others.
+fn measured_tets(answer: &Answer) -> String {
+    match answer.is_asked_size() {
+        true => answer.tets.to_string(),
+        false => format!("{} for {}", answer.tets, answer.asked_tets),
+    }
+}
+
 /// Times beside aims: below the line an aim is met.
 pub fn aim_plot(answers: &[Answer]) -> Plot {
     let mut plot = Plot::new(
@@ -203,8 +206,8 @@ pub fn aim_plot(answers: &[Answer]) -> Plot {
     }
     for (answer, aim) in timed() {
         let on = answer.threads.map_or("GPU".into(), |n| threads(n as u32));
-        let Answer { question, solver, asked_tets, .. } = answer;
-        let name = format!("{question}, {solver}, {asked_tets} tetrahedra, {on}");
+        let (Answer { question, solver, .. }, tets) = (answer, measured_tets(answer));
+        let name = format!("{question}, {solver}, {tets} tetrahedra, {on}");
         let series = Series::new(name, [[aim, 1e3 * answer.seconds]]);
         plot.series(series.with_style(Style::Markers));
     }

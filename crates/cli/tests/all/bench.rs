@@ -347,6 +347,10 @@ fn questions_are_answered_beside_their_aims() {
     for text in ["(bench/answers-and-aims.svg)", "(bench/rooflines.svg)", "evaluate_elements"] {
         assert!(report.contains(text), "{text} is not in {report}");
     }
+    // The plot's names are of the mesh that was measured.
+    let plot = String::from_utf8(folder.read("out/bench/answers-and-aims.svg")).expect("UTF-8");
+    let tets = format!("{} for {}", frames[3]["tets"], frames[3]["asked_tets"]);
+    assert!(plot.contains(&tets), "{tets} is not in {plot}");
     assert!(end.stdout.contains("20 Jacobi + Anderson iterations"), "{}", end.stdout);
 }
 

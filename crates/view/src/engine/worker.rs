@@ -235,6 +235,8 @@ impl Worker {
             }
             Command::Color(coloring) => {
                 self.coloring = coloring;
+                // The scale of its colours is that of a frame that is read.
+                (self.measured, self.was_due) = (None, false);
                 self.publish();
             }
             Command::Look => {

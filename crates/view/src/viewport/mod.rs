@@ -159,7 +159,11 @@ impl Viewport {
         let highest = heights.filter(|z| z.is_finite()).reduce(f32::max);
         self.highest = highest.map_or(self.middle.z, f64::from);
         let shown = snapshot.runs.iter().take(self.shown_runs());
-        self.legend.follow(snapshot.coloring, shown.flat_map(|run| run.values.iter().copied()));
+        // The scale follows the frames that are read, several times a second.
+        if shown.clone().all(|run| run.unread == 0) {
+            let values = shown.flat_map(|run| run.values.iter().copied());
+            self.legend.follow(snapshot.coloring, values);
+        }
         Ok(())
     }
 

@@ -10,6 +10,7 @@ use std::borrow::Cow;
 
 use super::Simulation;
 use super::error::FrameError;
+use crate::contact::Touch;
 use crate::scalar::Real;
 use crate::solver::{FrameReading, Solver};
 use crate::state::{ContactState, State};
@@ -74,6 +75,16 @@ impl<S: Real> Simulation<S> {
             let _ = device.read(&self.model, state.to_mut());
         }
         state
+    }
+
+    /// What tools touch in [`Simulation::state`]: of a device, for which this waits where the frame was not sent with
+    /// [`FrameReading::Balance`].
+    pub fn touches(&self) -> Cow<'_, [Touch]> {
+        let touches = &self.state.contact.touches;
+        match touches.is_empty() && self.unread == 0 && self.is_on_device() {
+            true => Cow::Owned(self.contact_of(&self.state).touches),
+            false => Cow::Borrowed(touches),
+        }
     }
 
     /// What is kept of contact in a state that is the last frame's; where a device is lost, where its tools were.

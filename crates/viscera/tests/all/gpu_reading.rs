@@ -2,6 +2,7 @@
 
 use crate::common::device::{device, own_device};
 use crate::gpu_tools::{SCENE, setting};
+use viscera::contact::VertexPressures;
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{Patch, Scene, Selector, read_tray};
 use viscera::settings::Place;
@@ -80,6 +81,31 @@ fn what_is_measured_is_of_the_last_frame() {
     }
     assert_same_state([&read, &unread]);
     assert_eq!(read.report(), unread.report());
+}
+
+/// What a tool touches is read with the balance, and else when it is asked for: the pressures of both add up to its force.
+#[test]
+fn what_tools_touch_is_known() {
+    let mut runs = both();
+    runs.iter_mut().for_each(|run| advance(run, FrameReading::Forces, 8));
+    let [balanced, unread] = &mut runs;
+    balanced.send_frame(FrameReading::Balance).expect("a frame");
+    while !balanced.take_frame().expect("a device") {}
+    advance(unread, FrameReading::Forces, 1);
+    assert!(unread.touches().is_empty(), "where tissue is now is not known");
+    unread.read_state().expect("a device");
+    assert!(unread.state().contact.touches.is_empty());
+    let touches = unread.touches().into_owned();
+    assert_eq!(touches, balanced.state().contact.touches);
+    let count = unread.model().vertex_count();
+    let pressures = VertexPressures::of(&unread.model().samples, &touches, count);
+    let [x, y, z] = unread.tool_forces()[0].force;
+    let force = vec3(x, y, z).length();
+    // Normals of a ball differ from sample to sample: their forces add up to no less than the one on the tool.
+    assert!(
+        pressures.force() >= force * (1.0 - 1e-5) && pressures.force() < 1.5 * force,
+        "{force}"
+    );
 }
 
 /// How fast a run moves is what it has moved since the frame that was read before, however many frames that is.
@@ -292,9 +318,9 @@ fn skins(assembly: &Assembly) -> Vec<Skin<'_>> {
 fn surfaces_follow_copies_that_stay_on_the_device() {
     let mut run = on_device();
     advance(&mut run, FrameReading::Forces, 9);
-    let copy = run.gpu().expect("a device").copy_positions(None);
+    let copy = run.gpu().expect("a device").copy_positions(None, None);
     advance(&mut run, FrameReading::Forces, 3);
-    let later = run.gpu().expect("a device").copy_positions(None);
+    let later = run.gpu().expect("a device").copy_positions(None, None);
     let mut same = on_device();
     let surface = GpuSurface::following_copies(&copy, &skins(run.assembly())).expect("it fits");
     let count = run.model().vertex_count();
@@ -314,11 +340,11 @@ fn surfaces_follow_copies_that_stay_on_the_device() {
     }
     assert!(all[0] == all[2] && all[0] != all[1]);
     // Memory of a copy that is no longer needed is taken for the next one; of another solver it is not.
-    let again = run.gpu().expect("a device").copy_positions(Some(copy));
+    let again = run.gpu().expect("a device").copy_positions(Some(copy), None);
     surface.place_copy(&again).expect("of the same solver");
     surface.update();
     assert!(surface.read().expect("a device") == all[1]);
-    let other = same.gpu().expect("a device").copy_positions(Some(again));
+    let other = same.gpu().expect("a device").copy_positions(Some(again), None);
     assert!(!surface.follows(&other) && surface.follows(&later));
     assert_eq!(surface.place_copy(&other), Err(GpuError::FollowsSolver));
     assert_eq!(by_host.place_copy(&later), Err(GpuError::FollowsSolver));

@@ -61,7 +61,8 @@ impl Worker {
     /// Whether this frame is to be measured: colours need it, or the last time was long ago. What is held
     /// rigidly has its force from there.
     fn is_measured(&mut self) -> bool {
-        let colors = matches!(self.coloring, Coloring::Strain | Coloring::Stress);
+        let colors = matches!(self.coloring, Coloring::Strain | Coloring::Stress)
+            && self.reading() != FrameReading::Forces;
         let long_ago = self.measured.is_none_or(|since| since.elapsed() > MEASURED_EVERY);
         // Of frames that take longer than that, every other one.
         let is_due = long_ago && !self.was_due || !self.playing;

@@ -75,6 +75,14 @@ impl Uniforms {
         Self { jobs, frame, tools, all }
     }
 
+    /// Puts jobs, one behind the other, from a place among all of them on [bytes].
+    pub fn put_jobs(&self, device: &Device, place: u64, jobs: &[Job]) {
+        for (number, job) in (0..).zip(jobs) {
+            let place = place + JOB_STRIDE * number;
+            device.queue.write_buffer(&self.jobs, place, bytemuck::bytes_of(job));
+        }
+    }
+
     /// Puts distances of closed surfaces, whole rows of words, in the place of those that were there.
     pub fn put_distances(&mut self, device: &Device, words: &[u32]) {
         let Self { jobs, frame, tools, .. } = &*self;

@@ -120,6 +120,11 @@ struct Frame {
 @group(0) @binding(32) var<storage, read_write> progress: array<PartProgress>;
 // What passes over recovered-gradient tetrahedra leave to each other (step/recovered/tables.wgsl).
 @group(0) @binding(33) var<storage, read_write> recovery: array<vec4f>;
+// Of pictures: positions of a frame [m], in w what is shown of vertices; a value of each tetrahedron, by block and lane, or a number
+// of each vertex; where the tetrahedra around each vertex begin, one more at the end, and these.
+@group(0) @binding(37) var<storage, read_write> frame_points: array<vec4f>;
+@group(0) @binding(38) var<storage, read_write> measured: array<f32>;
+@group(0) @binding(39) var<storage, read> around: array<u32>;
 
 @group(1) @binding(0) var<uniform> job: Job;
 @group(1) @binding(1) var<uniform> frame: Frame;

@@ -17,10 +17,14 @@ use crate::solver::inputs::{Inputs, check_inputs, check_state};
 use crate::solver::report::FrameReading;
 use crate::solver::step::balance::ForceBalance;
 use crate::solver::step::contacts::Contacts;
+use crate::solver::step::contacts::on_device::{DeviceTools, IS_THERE};
 use crate::solver::step::data::EndOfStep;
 use crate::solver::step::predict::load_tethers;
 use crate::solver::step::recovered::MeasuredTets;
 use crate::state::State;
+
+/// Slots of a balance before that of contact.
+const BEFORE_CONTACT: usize = 3;
 
 /// Positions at the end of a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,10 +133,16 @@ impl GpuSolver {
         put_in_user_order(layout, bytemuck::cast_slice(velocities), &mut state.velocities);
         state.multiplier_dt = self.multiplier_dt;
         if self.samples().is_some() {
-            // Who goes on without the device has to know where tools were. What they touched stays there.
+            // Who goes on without the device has to know where tools were. What they touched comes with the balance.
             state.contact.poses.clear();
             state.contact.poses.extend_from_slice(self.tools.all.poses());
             state.contact.touches.clear();
+            if IS_THERE && let Some(rows) = read.get(4 + BEFORE_CONTACT) {
+                let user = |v: usize| layout.numbering.order[v] as usize;
+                let place = |v: usize| state.positions[user(v)];
+                let touches = DeviceTools::touches(layout, bytemuck::cast_slice(rows), place);
+                state.contact.touches = touches;
+            }
         }
     }
 
@@ -278,7 +288,7 @@ impl GpuSolver {
             load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
         }
         let mut measured = MeasuredTets::new(model);
-        let mut more = read[3..].iter();
+        let mut more = read[BEFORE_CONTACT..].iter();
         let contacts = match self.samples() {
             Some(_) => more.next().map(|rows| bytemuck::cast_slice(rows)),
             None => None,

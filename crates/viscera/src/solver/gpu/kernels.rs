@@ -2,6 +2,7 @@
 
 use super::bindings::{storage_entry, uniform_layout};
 use super::device::{Device, Pipeline};
+use super::shown::SHOWS_VALUES;
 use super::slots::Slot;
 use crate::elements::TetForm;
 use crate::elements::text::kernel_text;
@@ -58,6 +59,8 @@ pub enum File {
     EndRecovered,
     FindContacts,
     EndContacts,
+    Values,
+    Pressures,
 }
 
 /// Choices that the text of a file depends on, beside the kernel.
@@ -202,6 +205,9 @@ kernels! {
         [Points Loads Control VertexData Table];
     END_CONTACTS = EndContacts "end_contacts" 256 [Points Loads PartialSums VertexData Table];
     REPORT_TOOLS = EndContacts "report_tools" 256 [PartialSums Table];
+    MEASURE_TETS = Values "measure_tets" 64 [Tets Table FramePoints Measured];
+    AVERAGE_TETS = Values "average_tets" 64 [Tets FramePoints Measured Around];
+    MEASURE_PRESSURES = Pressures "measure_pressures" 64 [Loads Table FramePoints Measured];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
@@ -292,6 +298,7 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
         File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
         File::Energy => guard(own(kernel_text!("../step/energy.wgsl"))),
+        File::Values if SHOWS_VALUES => [laws(), own(kernel_text!("values.wgsl"))].concat(),
         file if IS_THERE => files_of_solves(file),
         _ => Vec::new(),
     }
@@ -359,6 +366,7 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
         File::EndContacts => {
             [pieces(), vec![TOOLS, kernel_text!("../step/contacts/end.wgsl")]].concat()
         }
+        File::Pressures if SHOWS_VALUES => vec![TOOLS, kernel_text!("pressures.wgsl")],
         _ => Vec::new(),
     }
 }

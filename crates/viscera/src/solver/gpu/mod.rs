@@ -9,7 +9,7 @@
 //! GpuSolver::ask_for_frame, take_frame   all that a simulation needs of a frame, without waiting
 //! GpuSolver::restart  warm-start reset: multipliers from positions
 //! GpuSolver::time_step  the same, timed stage by stage by the device's clock
-//! GpuSolver::copy_positions, GpuSurface::place_copy   positions of a frame for a picture, on the device
+//! GpuSolver::copy_positions, GpuSurface::place_copy   positions of a frame for a picture, and values for its colours, on the device
 //! GpuSurface::update  a fine surface behind the last step, ready to be drawn
 //! ```
 //!
@@ -42,16 +42,20 @@ mod report;
 mod ring;
 mod sent;
 mod shared;
+mod shown;
 mod slots;
 mod solver;
 mod stages;
 mod step;
 mod surface;
+mod surface_kernels;
+mod surface_values;
 mod switch;
 mod timing;
 mod tools;
 mod traffic;
 pub(in crate::solver) mod uniforms;
+mod values;
 mod words;
 
 /// Whether this build has the quasi-Newton method on devices.
@@ -63,6 +67,7 @@ pub use error::GpuError;
 pub use frames::Frame;
 pub use positions::DevicePositions;
 pub use shared::{HostLayout, host_layouts};
+pub use shown::TissueValue;
 pub use slots::Slot;
 pub use solver::GpuSolver;
 pub use surface::{GpuSurface, Skin};

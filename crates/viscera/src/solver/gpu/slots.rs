@@ -48,13 +48,17 @@ pub enum Slot {
     StageStart,
     Contact,
     ToolSums,
+    FramePoints,
+    Measured,
+    Around,
 }
 
 impl Slot {
     /// Whether kernels only read it.
     pub fn is_read_only(self) -> bool {
-        use Slot::{CornerIndices, Levels, Materials, Offsets, Table, Tets, Updates};
-        matches!(self, Tets | Materials | CornerIndices | Offsets | Updates | Table | Levels)
+        use Slot::{Around, CornerIndices, Levels, Materials, Offsets, Table, Tets, Updates};
+        let of_step = matches!(self, Offsets | Updates | Table | Levels | Around);
+        of_step || matches!(self, Tets | Materials | CornerIndices)
     }
 }
 

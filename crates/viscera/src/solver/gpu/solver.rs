@@ -13,6 +13,7 @@ use super::parts::{Falls, SmallSteps};
 use super::reading::Sent;
 use super::record::{Dispatch, Recorder};
 use super::ring::Frames;
+use super::shown::{self, OfValues};
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
 use super::tools::OfTools;
@@ -83,6 +84,8 @@ pub struct GpuSolver {
     pub(super) levels: Option<DeviceLevels>,
     /// Of the last step.
     pub(super) passes: u32,
+    /// What pictures show.
+    pub(super) values: OfValues,
 }
 
 /// Short: it holds a whole model.
@@ -143,21 +146,18 @@ impl GpuSolver {
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
-        let uniforms = Uniforms::new(device, job_count);
+        let uniforms = Uniforms::new(device, job_count + shown::JOBS as u64);
         let mut next = 0;
         let [prologue, body, epilogue, restart] = lists.map(|list| {
             let prepare = |dispatch: &Dispatch| {
                 let offset = next;
                 next += JOB_STRIDE;
-                device.queue.write_buffer(
-                    &uniforms.jobs,
-                    offset,
-                    bytemuck::bytes_of(&dispatch.job),
-                );
+                uniforms.put_jobs(device, offset, &[dispatch.job]);
                 prepare(device, &buffers, dispatch, offset as u32)
             };
             list.iter().map(prepare).collect()
         });
+        uniforms.put_jobs(device, next, &shown::jobs(&laid));
         let is_explicit = settings.method == Method::Explicit;
         let mut solver = Self {
             outgoing: Outgoing::new(device),
@@ -194,6 +194,7 @@ impl GpuSolver {
             buffers,
             levels,
             passes: 0,
+            values: OfValues::default(),
         };
         if let Some(table) = table {
             solver.put_levels(&table);
@@ -267,7 +268,8 @@ impl GpuSolver {
 
     /// Bytes of device memory.
     pub fn bytes(&self) -> u64 {
-        self.buffers.bytes() + self.uniforms.jobs.size() + self.frames.bytes() + self.forces.bytes()
+        let frames = self.frames.bytes() + self.forces.bytes();
+        self.buffers.bytes() + self.uniforms.jobs.size() + frames + self.values.bytes()
     }
 
     /// Positions [m] as four floats a vertex, of which the last does not count, in the solver's

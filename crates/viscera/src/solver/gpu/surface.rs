@@ -10,12 +10,16 @@ use std::sync::{Arc, OnceLock};
 use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages;
 
-use super::device::{Device, Pipeline};
+use super::device::Device;
 use super::error::GpuError;
 use super::limits::MOST_GROUPS;
 use super::positions::DevicePositions;
 use super::reading;
+use super::shown::SHOWS_VALUES;
 use super::solver::GpuSolver;
+use super::surface_kernels::{
+    BINDINGS, POINTS, Ready, STRIDE, WORKGROUP, buffer, check_size, filled, prepare,
+};
 use crate::layout::Layout;
 use crate::mesh::embed::{Embedding, EmbeddingError};
 use crate::model::Model;
@@ -36,14 +40,15 @@ pub struct Skin<'a> {
 /// device, or positions that the caller brings.
 #[derive(Debug)]
 pub struct GpuSurface {
-    device: Device,
-    vertices: wgpu::Buffer,
+    pub(super) device: Device,
+    pub(super) vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
-    vertex_count: u32,
+    pub(super) vertex_count: u32,
     triangles: Vec<[u32; 3]>,
     /// Made when first asked for: few pictures show them.
     edges: OnceLock<wgpu::Buffer>,
     placed: Option<Placed>,
+    pub(super) bounds: wgpu::Buffer,
     embed: Ready,
     normals: Ready,
 }
@@ -55,12 +60,8 @@ struct Placed {
     count: usize,
     /// In the order of the solver that has this; in the user's where there is none.
     layout: Option<Arc<Layout<f32>>>,
-}
-
-#[derive(Debug)]
-struct Ready {
-    pipeline: wgpu::ComputePipeline,
-    storage: wgpu::BindGroup,
+    /// The surface at rest [m], four floats a vertex, where values are shown on it.
+    rest: Option<wgpu::Buffer>,
 }
 
 /// `Bound` of surface.wgsl.
@@ -70,22 +71,6 @@ struct Bound {
     corners: [u32; 4],
     weights: [f32; 4],
 }
-
-/// Threads of a workgroup in surface.wgsl.
-const WORKGROUP: u32 = 64;
-
-/// Bytes of a vertex.
-const STRIDE: u64 = 32;
-
-/// Numbers of the arrays in surface.wgsl, and what kernels only read.
-const POINTS: usize = 0;
-const BINDINGS: [(&str, bool); 5] = [
-    ("positions", true),
-    ("weights of the surface", true),
-    ("vertices of the surface", true),
-    ("triangles of the surface", true),
-    ("surface", false),
-];
 
 impl GpuSurface {
     /// Binds surfaces to the tetrahedra of a solver's model; they are where its last step has brought them.
@@ -121,7 +106,13 @@ impl GpuSurface {
         let count = layout.vertex_count();
         let order = |v: u32| layout.numbering.of(v) as u32;
         let bounds = bounds(count, order, skins)?;
-        Self::placed(device, (count, Some(Arc::clone(layout))), &bounds, skins)
+        let mut surface = Self::placed(device, (count, Some(Arc::clone(layout))), &bounds, skins)?;
+        if SHOWS_VALUES && let Some(placed) = &mut surface.placed {
+            let rest = at_rest(&layout.rest_positions, skins);
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+            placed.rest = Some(filled(device, BINDINGS[5].0, bytemuck::cast_slice(&rest), usage));
+        }
+        Ok(surface)
     }
 
     fn placed(
@@ -135,7 +126,8 @@ impl GpuSurface {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let positions = buffer(device, BINDINGS[POINTS].0, size, usage);
         let surface = Self::bind(device, &positions, bounds, skins)?;
-        Ok(Self { placed: Some(Placed { positions, count, layout }), ..surface })
+        let placed = Placed { positions, count, layout, rest: None };
+        Ok(Self { placed: Some(placed), ..surface })
     }
 
     fn bind(
@@ -165,8 +157,9 @@ impl GpuSurface {
         let all = [positions, &bound, &first, &pairs, &vertices];
         let index = storage | BufferUsages::INDEX;
         let surface = Self {
-            embed: prepare(device, "embed", &[POINTS, 1, 4], &all),
-            normals: prepare(device, "smooth_normals", &[1, 2, 3, 4], &all),
+            embed: prepare(device, "embed", &[POINTS, 1, 4].map(|i| (i, all[i]))),
+            normals: prepare(device, "smooth_normals", &[1, 2, 3, 4].map(|i| (i, all[i]))),
+            bounds: bound,
             indices: filled(device, "indices of the surface", indices, index),
             device: device.clone(),
             vertices,
@@ -237,13 +230,24 @@ impl GpuSurface {
             label: Some("surface"),
             timestamp_writes: None,
         });
+        self.each_vertex(&mut pass, &[&self.embed, &self.normals]);
+    }
+
+    /// A thread for each vertex, kernel by kernel.
+    pub(super) fn each_vertex(&self, pass: &mut wgpu::ComputePass<'_>, list: &[&Ready]) {
         let groups = self.vertex_count.div_ceil(WORKGROUP);
         let along = groups.min(MOST_GROUPS);
-        for ready in [&self.embed, &self.normals] {
+        for ready in list {
             pass.set_pipeline(&ready.pipeline);
             pass.set_bind_group(0, &ready.storage, &[]);
             pass.dispatch_workgroups(along, groups.div_ceil(along.max(1)), 1);
         }
+    }
+
+    /// The positions that copies are put into, and the surface at rest, where it shows values.
+    pub(super) fn shown(&self) -> Option<[&wgpu::Buffer; 2]> {
+        let placed = self.placed.as_ref()?;
+        Some([&placed.positions, placed.rest.as_ref()?])
     }
 
     /// Positions [m] and normals, [`GpuSurface::vertex_layout`]; for vertex and storage bindings.
@@ -325,6 +329,21 @@ fn bounds(
     Ok(bounds)
 }
 
+/// Places of all surfaces where the tetrahedra's vertices are at rest.
+fn at_rest(rest: &[Vec3<f32>], skins: &[Skin<'_>]) -> Vec<[f32; 4]> {
+    let mut places = Vec::new();
+    for Skin { embedding, first_vertex, .. } in skins {
+        for (corners, weights) in embedding.corners().iter().zip(embedding.weights()) {
+            let sum = corners.iter().zip(weights).fold(Vec3::<f64>::ZERO, |sum, (&v, weight)| {
+                sum + rest[first_vertex + v as usize].cast::<f64>() * *weight
+            });
+            let [x, y, z] = sum.cast::<f32>().to_array();
+            places.push([x, y, z, 1.0]);
+        }
+    }
+    places
+}
+
 /// Whether every surface follows tetrahedra of the body whose first vertex it names.
 fn check_tets(model: &Model<f32>, skins: &[Skin<'_>]) -> Result<(), EmbeddingError> {
     for skin in skins {
@@ -387,86 +406,4 @@ fn edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     edges.sort_unstable();
     edges.dedup();
     edges
-}
-
-fn check_size(device: &Device, needed: u64, vertices: usize) -> Result<(), GpuError> {
-    let limits = device.limits();
-    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    if needed <= limit {
-        return Ok(());
-    }
-    let largest = (vertices as f64 * limit as f64 / needed as f64) as u64;
-    Err(GpuError::SurfaceTooLarge { needed, limit, name: device.name().to_owned(), largest })
-}
-
-fn buffer(device: &Device, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
-    device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        // A binding is never empty.
-        size: size.max(STRIDE),
-        usage,
-        mapped_at_creation: false,
-    })
-}
-
-fn filled(device: &Device, label: &str, bytes: &[u8], usage: BufferUsages) -> wgpu::Buffer {
-    let buffer = buffer(device, label, bytes.len() as u64, usage);
-    device.queue.write_buffer(&buffer, 0, bytes);
-    buffer
-}
-
-fn prepare(
-    device: &Device,
-    entry: &'static str,
-    bindings: &[usize],
-    all: &[&wgpu::Buffer; 5],
-) -> Ready {
-    let mut known = device.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let made = known.entry(entry.to_owned()).or_insert_with(|| compile(device, entry, bindings));
-    let entries: Vec<_> = bindings
-        .iter()
-        .map(|&i| wgpu::BindGroupEntry { binding: i as u32, resource: all[i].as_entire_binding() })
-        .collect();
-    let storage = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some(entry),
-        layout: &made.storage,
-        entries: &entries,
-    });
-    Ready { pipeline: made.pipeline.clone(), storage }
-}
-
-fn compile(device: &Device, entry: &'static str, bindings: &[usize]) -> Pipeline {
-    let wgpu = &device.device;
-    let module = wgpu.create_shader_module(wgpu::include_wgsl!("surface.wgsl"));
-    let entries: Vec<_> = bindings
-        .iter()
-        .map(|&i| wgpu::BindGroupLayoutEntry {
-            binding: i as u32,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: BINDINGS[i].1 },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        })
-        .collect();
-    let storage = wgpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some(entry),
-        entries: &entries,
-    });
-    let layout = wgpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(entry),
-        bind_group_layouts: &[Some(&storage)],
-        immediate_size: 0,
-    });
-    let pipeline = wgpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(entry),
-        layout: Some(&layout),
-        module: &module,
-        entry_point: Some(entry),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    });
-    Pipeline { pipeline, storage }
 }

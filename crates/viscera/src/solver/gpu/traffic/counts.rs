@@ -349,7 +349,10 @@ impl Counts<'_> {
 
 /// What the tables say of all kernels.
 pub fn entries() -> impl Iterator<Item = &'static super::table::Entry> {
-    [step::TABLE, xpbd::TABLE, explicit::TABLE, quasi_newton::TABLE].into_iter().flatten()
+    let of_pictures = super::values::TABLE;
+    [step::TABLE, xpbd::TABLE, explicit::TABLE, quasi_newton::TABLE, of_pictures]
+        .into_iter()
+        .flatten()
 }
 
 fn entry(kernel: &Kernel) -> Option<&'static super::table::Entry> {

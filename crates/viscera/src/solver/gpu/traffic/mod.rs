@@ -16,6 +16,7 @@ mod explicit;
 mod quasi_newton;
 mod step;
 mod table;
+mod values;
 mod xpbd;
 
 use super::buffers::{Buffers, Size};
