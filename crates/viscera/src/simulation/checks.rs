@@ -33,8 +33,8 @@ pub(super) fn check_tools<'a>(
         std::iter::repeat_n(tool.spring.is_some(), count)
     });
     let why = match method {
-        Method::QuasiNewton => beyond_devices(parts),
-        _ => Some(METHOD_ON_DEVICE),
+        Method::Explicit => Some(METHOD_ON_DEVICE),
+        _ => beyond_devices(parts),
     };
     why.map_or(Ok(()), |why| Err(SimulationError::ToolsOnDevice { device, why }))
 }

@@ -25,7 +25,7 @@ fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
     if !IS_THERE {
         return Some("contact with tools was left out of this build; use `device = \"auto\"`");
     }
-    if method != Method::QuasiNewton {
+    if method == Method::Explicit {
         return Some(METHOD_ON_DEVICE);
     }
     beyond_devices(tools.iter().map(|tool| tool.held.is_some()))
@@ -83,6 +83,9 @@ impl GpuSolver {
         }
         if let Some(why) = refuses(self.settings.method, tools) {
             return Err(StepError::ContactOnDevice { why });
+        }
+        if !tools.is_empty() && !self.settings.takes_contact() {
+            return Err(StepError::ContactNeedsRebase);
         }
         let share = self.solve_share();
         if let Some(words) = self.tools.all.new_distances(tools) {

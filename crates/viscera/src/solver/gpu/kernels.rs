@@ -58,6 +58,7 @@ pub enum File {
     End,
     EndRecovered,
     FindContacts,
+    LoadContacts,
     EndContacts,
     Values,
     Pressures,
@@ -107,8 +108,7 @@ macro_rules! kernels {
 
 kernels! {
     APPLY_UPDATES = Predict "apply_updates" 64 [Predicted ExternalForces Targets Updates Control];
-    PREDICT = Predict "predict" 64
-        [Points Velocities Previous Predicted ExternalForces Targets Starts Table];
+    PREDICT = Predict "predict" 64 [Points Control VertexData Table];
     REBASE = Rebase "rebase" 64 [Points Loads Previous Predicted ExternalForces Table];
     RECOMPUTE_POSITIONS = Rebase "recompute_positions" 64 [Points Loads Predicted ExternalForces Table];
     SPLIT_COPIES = Rebase "split_copies" 64 [Offsets Points Copies];
@@ -161,7 +161,8 @@ kernels! {
     END_EXPLICIT_RECOVERED = ExplicitRecovered "end_explicit" 64
         [Points Loads VertexData Table Recovery];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
-    EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control VertexData Table];
+    EVALUATE = Evaluate "evaluate" 256
+        [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     SEARCH = Search "search" 256
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
@@ -203,6 +204,7 @@ kernels! {
         [Points PartialSums Control VertexData Table Progress Recovery];
     FIND_CONTACTS = FindContacts "find_contacts" 64
         [Points Loads Control VertexData Table];
+    LOAD_CONTACTS = LoadContacts "load_contacts" 64 [Points Loads Table];
     END_CONTACTS = EndContacts "end_contacts" 256 [Points Loads PartialSums VertexData Table];
     REPORT_TOOLS = EndContacts "report_tools" 256 [PartialSums Table];
     MEASURE_TETS = Values "measure_tets" 64 [Tets Table FramePoints Measured];
@@ -231,6 +233,17 @@ const ELEMENTS: &str = kernel_text!("elements.wgsl");
 
 /// Samples and tools.
 const TOOLS: &str = kernel_text!("../step/contacts/tools.wgsl");
+
+/// Contact at vertices, or nothing.
+const CONTACT: &str = if IS_THERE {
+    kernel_text!("../step/contacts/gather.wgsl")
+} else {
+    kernel_text!("../step/contacts/none.wgsl")
+};
+
+/// Contact in the incremental potential; beside nothing at vertices it is empty.
+const SAMPLES: &[&str] =
+    if IS_THERE { &[TOOLS, kernel_text!("../step/contacts/potential.wgsl")] } else { &[] };
 
 /// In the place of recovered-gradient tetrahedra.
 const PLAIN: &str = kernel_text!("../step/recovered/none.wgsl");
@@ -261,11 +274,11 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     let guard = |own: Vec<&'static str>| {
         let potential =
             [kernel_text!("../step/potential.wgsl"), kernel_text!("../step/guard_decide.wgsl")];
-        [laws(), pieces(), potential.to_vec(), own].concat()
+        [laws(), pieces(), vec![CONTACT], SAMPLES.to_vec(), potential.to_vec(), own].concat()
     };
     match kernel.file {
         File::Predict => own(kernel_text!("../step/predict.wgsl")),
-        File::Rebase => own(kernel_text!("../xpbd/rebase.wgsl")),
+        File::Rebase => vec![CONTACT, kernel_text!("../xpbd/rebase.wgsl")],
         File::Sweep => [form, vec![swept, SWEEP_TET, kernel_text!("../xpbd/sweep.wgsl")]].concat(),
         File::SweepClusters if !HAS_CLUSTERS => Vec::new(),
         File::SweepClusters => {
@@ -363,6 +376,7 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
             solve([tables.to_vec(), own.to_vec()].concat())
         }
         File::FindContacts => vec![TOOLS, kernel_text!("../step/contacts/find.wgsl")],
+        File::LoadContacts => SAMPLES.to_vec(),
         File::EndContacts => {
             [pieces(), vec![TOOLS, kernel_text!("../step/contacts/end.wgsl")]].concat()
         }

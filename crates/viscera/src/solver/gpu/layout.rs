@@ -354,7 +354,8 @@ impl DeviceLayout {
             return [lines, lines + each, lines + 2 * each];
         }
         let energies = lines + 2 * LINE_SUMS * pieces;
-        let elements = (LANES * self.corners.len() + self.elements.len()) as u64;
+        let samples = Samples::known(self.samples).map_or(0, |samples| samples.count as usize);
+        let elements = (LANES * self.corners.len() + self.elements.len() + samples) as u64;
         [lines, energies, energies + if guarded { elements } else { 0 }]
     }
 
@@ -426,7 +427,7 @@ pub(super) fn copy_offsets(layout: &Layout<f32>) -> Vec<u32> {
 
 /// Samples of the surface, where a method computes contact on devices.
 fn samples_of(layout: &Layout<f32>, settings: &SolverSettings) -> Option<Samples> {
-    Samples::new(layout).filter(|_| settings.method == Method::QuasiNewton)
+    Samples::new(layout).filter(|_| settings.method != Method::Explicit)
 }
 
 /// The blocks where the tetrahedra of each law end.

@@ -1,7 +1,7 @@
 //! Dispatches, and how they are made: what the recorders of all stages share.
 
 use super::kernels::{Kernel, Swept, Variant};
-use super::layout::{DeviceLayout, Pieces};
+use super::layout::Pieces;
 use super::limits::window;
 use super::members::element_range;
 use super::slots::{Place, Slot};
@@ -50,8 +50,6 @@ pub struct Recorder<'a> {
     pub length: u32,
     pub multipliers_first: u32,
     swept: Swept,
-    /// Vertices from one range of the vertex data to the next.
-    pub stride: u32,
     pub pieces: Pieces,
     /// Of the quasi-Newton method.
     pub levels: Option<&'a DeviceLevels>,
@@ -85,7 +83,6 @@ impl<'a> Recorder<'a> {
                 (true, true) => Swept::Jacobi,
                 (true, false) => Swept::Copies,
             },
-            stride: DeviceLayout::stride(layout),
             pieces,
             levels,
             recovered: Extent::new(layout),

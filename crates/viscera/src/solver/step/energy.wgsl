@@ -2,6 +2,14 @@
 //
 //   T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i
 //   v *= sqrt(limit/T_1) where it is exceeded; without any hold relative to the center of mass
+//   where tools are near, the smaller of two limits: at most T_n above what the tools say that they do, W
+
+// Of what tools give: energy [J] that they add by moving into tissue that stands still, their work [J] by the forces at the start of
+// the step and at its end, and samples that they are near to. In the place of sums that the limit does not need.
+const GIVEN_LIFTED: u32 = SUM_MAGNITUDE;
+const GIVEN_WORK_BEFORE: u32 = SUM_FORCE;
+const GIVEN_WORK_AFTER: u32 = SUM_REACH;
+const GIVEN_NEAR: u32 = SUM_AHEAD;
 
 fn vector_at(sum: u32) -> vec3f {
     return vec3f(totals[sum], totals[sum + 1u], totals[sum + 2u]);
@@ -73,10 +81,16 @@ fn add_motions(part: u32, local: u32, into: ptr<function, Sums>) {
     // Of elements what is stored, and whether something holds them.
     let elements_end = table[row + PART_ELEMENT_PIECES_END];
     for (var piece = table[row + PART_ELEMENT_PIECES] + local; piece < elements_end; piece += THREADS) {
-        // Without the weight dt^2 of the potential: `limit_of` needs energies [J]. Of these sums it reads
-        // SUM_TESTED, SUM_REFERENCE and SUM_HELD; what lies between does no harm.
-        for (var k = SUM_TESTED; k <= SUM_HELD; k++) {
-            (*into)[k] += partial_sums[SUMS * piece + k];
+        // Without the weight dt^2 of the potential: `limit_of` needs energies [J].
+        let at = SUMS * piece;
+        (*into)[SUM_TESTED] += partial_sums[at + SUM_TESTED];
+        (*into)[SUM_REFERENCE] += partial_sums[at + SUM_REFERENCE];
+        (*into)[SUM_HELD] += partial_sums[at + SUM_HELD];
+        if has_samples() {
+            (*into)[GIVEN_LIFTED] += partial_sums[at + SUM_GIVEN];
+            (*into)[GIVEN_WORK_BEFORE] += partial_sums[at + SUM_GIVEN + 1u];
+            (*into)[GIVEN_WORK_AFTER] += partial_sums[at + SUM_GIVEN + 2u];
+            (*into)[GIVEN_NEAR] += partial_sums[at + SUM_GIVEN + 3u];
         }
     }
     let vertices_end = table[row + PART_VERTEX_PIECES_END];
@@ -104,6 +118,13 @@ fn limit_of(part: u32) -> Limit {
         given = totals[SUM_RELATIVE_START] - 0.5 * inverse * dot(before, before);
         given += totals[SUM_RELATIVE_WORK] - frame.dt * inverse * dot(vector_at(SUM_LOAD), after);
         given -= totals[SUM_TESTED];
+    }
+    if totals[GIVEN_NEAR] > 0.0 {
+        // Tools move while the tissue stands: that bound charges the overlap that they make. The other charges what they say
+        // that they do, and only forbids to gain.
+        let after = totals[GIVEN_WORK_AFTER];
+        let work = max(after, 0.5 * (totals[GIVEN_WORK_BEFORE] + after));
+        given = min(given, max(given - totals[GIVEN_LIFTED] + work, totals[SUM_KINETIC_START]));
     }
     var share = 1.0;
     // Energies are differences to the start of the step. Where one there is NaN its difference means nothing, and

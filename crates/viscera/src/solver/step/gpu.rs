@@ -89,9 +89,7 @@ impl Recorder<'_> {
             Start::Auto => 3,
         };
         let keeps = if is_kept { 4 } else { 0 };
-        let mut predict = self.vertices(&kernels::PREDICT, mode | keeps);
-        predict.job.set_first = self.stride;
-        into.push(predict);
+        into.push(self.vertices(&kernels::PREDICT, mode | keeps));
     }
 
     /// A workgroup for each piece of the sums.

@@ -22,7 +22,10 @@ fn evaluate(
         return;
     }
     let are_vertices = table[row + PIECE_ARE_VERTICES] != 0u;
-    let sum_groups = select(1u, SUMS / 8u, are_vertices && (job.mode & WITH_MOTION) != 0u);
+    var sum_groups = 1u;
+    if (job.mode & WITH_MOTION) != 0u {
+        sum_groups = select(select(1u, 2u, has_samples()), SUMS / 8u, are_vertices);
+    }
     // Whatever is long is called at one place.
     for (var is_found = (job.mode & IF_REJECTED) == 0u; ; is_found = true) {
         var sums: Sums;

@@ -199,11 +199,12 @@ fn direction_of(v: u32, origin: vec3f) -> Direction {
         return Direction();
     }
     let load = gather(v);
+    let contact = contact_on(v);
     let predicted = vertex_data_of(PREDICTED, v);
     // As `descent` on the CPU. Every element at the vertex does this again, because within a dispatch it cannot
     // read what the workgroup of the vertex finds; the loads are those of the dispatch before.
-    let gradient = (origin - predicted.xyz) * predicted.w - load.xyz;
-    let descent = gradient * (-1.0 / (predicted.w + load.w));
+    let gradient = (origin - predicted.xyz) * predicted.w - load.xyz - contact.force;
+    let descent = gradient * (-1.0 / (predicted.w + load.w + contact.bound));
     return Direction(descent, dot(gradient, descent));
 }
 
@@ -228,7 +229,7 @@ fn line_at(k: u32, before: f32) -> f32 {
 }
 
 fn try_element(element: u32, now: Next, into: ptr<function, Sums>) {
-    let corners = corners_of(element);
+    let corners = corners_of_member(element);
     var origin: array<vec3f, 4>;
     var direction: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
@@ -317,6 +318,10 @@ fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
 fn load_forces(element: u32, x: array<vec3f, 4>) {
     let squared = frame.squared_dt;
     let tet_lanes = table[TET_LANES_AT];
+    if is_sample(element) {
+        load_sample(element, x);
+        return;
+    }
     if element < tet_lanes {
         let block = element / LANES;
         let lane = element % LANES;

@@ -37,6 +37,8 @@ const SUM_MASS: u32 = 14u;
 const SUM_MOMENTUM_START: u32 = 15u;
 const SUM_MOMENTUM: u32 = 18u;
 const SUM_LOAD: u32 = 21u;
+// Of elements in the place of these: what the motion of tools gives to samples (contacts/potential.wgsl).
+const SUM_GIVEN: u32 = 8u;
 
 fn place(source: u32, v: u32) -> vec3f {
     if source == POINTS {
@@ -109,9 +111,13 @@ fn tet_answer(block: u32, lane: u32, x: array<vec3f, 4>, with_force: bool) -> ve
     return vec2f(tet.volume * density, squared);
 }
 
-// Energy [J] of an element whose vertices are at `x` and, of a tetrahedron where wanted, its squared force [N^2].
+// Energy [J] of an element whose vertices are at `x` and, of a tetrahedron where wanted, its squared force [N^2]; of a sample of
+// the surface since the reference, and its squared force.
 fn answer(element: u32, x: array<vec3f, 4>, with_force: bool) -> vec2f {
     let tet_lanes = table[TET_LANES_AT];
+    if is_sample(element) {
+        return sample_answer(element, x);
+    }
     if element < tet_lanes {
         return tet_answer(element / LANES, element % LANES, x, with_force);
     }
@@ -132,7 +138,7 @@ fn inertia(v: u32, x: vec3f) -> f32 {
 fn add_element(element: u32, mode: u32, into: ptr<function, Sums>) {
     // Energies are called at one place: compilers put them in wherever they are called.
     var sources = array<u32, 4>(REFERENCE, AHEAD, START, tested_at);
-    let corners = corners_of(element);
+    let corners = corners_of_member(element);
     for (var k = select(3u, 0u, (mode & WITH_STARTS) != 0u); k < 4u; k++) {
         let source = sources[k];
         let x = array<vec3f, 4>(
@@ -150,11 +156,34 @@ fn add_element(element: u32, mode: u32, into: ptr<function, Sums>) {
             (*into)[SUM_START] += found.x - reference_of(element);
         } else {
             add_tested(element, found, into);
+            if is_sample(element) {
+                add_given(element, x, mode, into);
+                return;
+            }
         }
     }
     let tet_lanes = table[TET_LANES_AT];
     if element >= tet_lanes && element_is_anchored(table[element_row(element - tet_lanes) + ELEMENT_KIND]) {
         (*into)[SUM_HELD] += 1.0;
+    }
+}
+
+fn corners_of_member(element: u32) -> array<u32, 4> {
+    if is_sample(element) {
+        return sample_corners(element);
+    }
+    return corners_of(element);
+}
+
+// A tool that is near can stop the part.
+fn add_given(element: u32, x: array<vec3f, 4>, mode: u32, into: ptr<function, Sums>) {
+    if (mode & WITH_MOTION) == 0u {
+        return;
+    }
+    let given = given_to(element, x);
+    (*into)[SUM_HELD] += given.w;
+    for (var k = 0u; k < 4u; k++) {
+        (*into)[SUM_GIVEN + k] += given[k];
     }
 }
 

@@ -35,9 +35,9 @@ fn apply_updates(
 
 // xt = x + dt v + dt^2 (g + M^-1 (f + k (a - y))), y without the last term: soft position constraints k to
 // targets a are a part of the inertia (step/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v
-// (mode 1), xt (mode 2) or, in mode 3, x + dt v, where nothing holds the part with its mean acceleration. Pins move
-// to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the possible starts of the step are kept,
-// `job.set_first` vertices apart.
+// (mode 1), xt (mode 2) or, in mode 3, x + dt v, where nothing holds the part, and no tool presses on it, with its mean
+// acceleration. Pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the possible starts of the
+// step are kept.
 @compute @workgroup_size(64)
 fn predict(
     @builtin(global_invocation_id) id: vec3u,
@@ -48,16 +48,17 @@ fn predict(
         return;
     }
     let x = points[v].xyz;
-    let mass = predicted[v].w;
-    let on_vertex = external_forces[v];
-    let inertial = x + velocities[v].xyz * frame.dt;
-    let hold = targets[v];
+    let mass = vertex_data_of(PREDICTED, v).w;
+    let on_vertex = vertex_data_of(EXTERNAL_FORCES, v);
+    let inertial = x + vertex_data_of(VELOCITIES, v).xyz * frame.dt;
+    let hold = vertex_data_of(TARGETS, v);
     let pull = (hold.xyz - (inertial + frame.gravity * frame.squared_dt)) * hold.w;
     let load = (on_vertex.xyz + pull) * (1.0 / mass);
     let xt = inertial + (frame.gravity + load) * frame.squared_dt;
-    let copy_count = previous[v].w;
-    previous[v] = vec4f(x, copy_count);
-    predicted[v] = vec4f(xt, mass);
+    let copy_count = vertex_data_of(PREVIOUS, v).w;
+    let stride = table[STRIDE_AT];
+    vertex_data[PREVIOUS * stride + v] = vec4f(x, copy_count);
+    vertex_data[PREDICTED * stride + v] = vec4f(xt, mass);
     var start = x;
     if (job.mode & 3u) == 1u {
         start = inertial;
@@ -65,8 +66,10 @@ fn predict(
         start = xt;
     } else if (job.mode & 3u) == 3u {
         start = inertial;
-        let fall = table[FALLS_AT] + FALL_WORDS * part_with(PART_VERTICES_END, v);
-        if table[fall + FALL_IS_FREE] != 0u {
+        let part = part_with(PART_VERTICES_END, v);
+        let fall = table[FALLS_AT] + FALL_WORDS * part;
+        let lies = atomicLoad(&control.parts[part].pressed_step) == control.step;
+        if table[fall + FALL_IS_FREE] != 0u && !lies {
             let at = fall + FALL_ACCELERATION;
             let acceleration = vec3f(number(at), number(at + 1u), number(at + 2u));
             start = inertial + acceleration * frame.squared_dt;
@@ -76,9 +79,9 @@ fn predict(
     start = select(start, hold.xyz, is_pinned);
     points[v] = vec4f(start, on_vertex.w * copy_count);
     if (job.mode & 4u) != 0u {
-        starts[v] = vec4f(select(x, start, is_pinned), 0.0);
-        starts[job.set_first + v] = vec4f(select(xt, start, is_pinned), 0.0);
-        starts[2u * job.set_first + v] = vec4f(start, 0.0);
+        vertex_data[REFERENCE * stride + v] = vec4f(select(x, start, is_pinned), 0.0);
+        vertex_data[AHEAD * stride + v] = vec4f(select(xt, start, is_pinned), 0.0);
+        vertex_data[START * stride + v] = vec4f(start, 0.0);
     }
 }
 

@@ -9,6 +9,7 @@ use crate::solver::gpu::kernels::{self, Swept};
 use crate::solver::gpu::limits::window;
 use crate::solver::gpu::record::{Dispatch, Recorder};
 use crate::solver::gpu::uniforms::Job;
+use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::modes;
 
 /// Workgroups of a repair: enough for a device to be busy when there is something to repair, few enough to
@@ -74,6 +75,11 @@ impl Recorder<'_> {
     fn load_corners(&self, into: &mut Vec<Dispatch>) {
         self.each_set(&kernels::LOAD_MULTIPLIERS, into);
         into.extend(self.elements(&kernels::LOAD_ELEMENTS, None));
+        let of_samples = |samples: Samples| {
+            let job = Job { count: samples.count, ..Job::default() };
+            self.threads(&kernels::LOAD_CONTACTS, job)
+        };
+        into.extend(Samples::known(self.samples).map(of_samples));
     }
 
     fn solve_color(&self, color: usize, into: &mut Vec<Dispatch>) {

@@ -1,7 +1,7 @@
 // Vertices between sweeps (xpbd/rebase.rs).
 
 // Stabilised rebase: r = M (x - xt) - J^T l, mh = m + share of the bounds, x -= theta r/mh, w = 1/mh per
-// copy.
+// copy. Where tools are near Mh of contact is added to mh (contacts/gather.wgsl), and never to w.
 @compute @workgroup_size(64)
 fn rebase(
     @builtin(global_invocation_id) id: vec3u,
@@ -14,10 +14,16 @@ fn rebase(
     let load = gather(v);
     let place = points[v].xyz;
     let inertia = predicted[v];
-    let residual = (place - inertia.xyz) * inertia.w - load.xyz;
+    let contact = contact_on(v);
+    let residual = (place - inertia.xyz) * inertia.w - load.xyz - contact.force;
     let row = part_row(part_with(PART_VERTICES_END, v));
-    let inverse = 1.0 / (inertia.w + load.w * number(row + PART_BOUND_SHARE));
-    let x = place - residual * (number(row + PART_REBASE_FACTOR) * inverse);
+    let bound = inertia.w + load.w * number(row + PART_BOUND_SHARE);
+    let inverse = 1.0 / bound;
+    let factor = number(row + PART_REBASE_FACTOR);
+    var x = place - residual * (factor * inverse);
+    if contact.is_near {
+        x = place - resolved(contact, bound, residual) * factor;
+    }
     points[v] = vec4f(x, inverse * previous[v].w);
 }
 
@@ -31,7 +37,7 @@ fn recompute_positions(
     if v >= job.count || external_forces[v].w == 0.0 {
         return;
     }
-    let impulse = gather(v).xyz;
+    let impulse = gather(v).xyz + contact_on(v).force;
     points[v] = vec4f(predicted[v].xyz + impulse * external_forces[v].w, points[v].w);
 }
 

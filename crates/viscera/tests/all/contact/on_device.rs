@@ -73,7 +73,8 @@ fn scene_of<S: Real>(settings: &SolverSettings, cells: [usize; 3]) -> Scene<S> {
     scene
 }
 
-fn advance<S: Real>(scene: &mut Scene<S>) -> Vec<Wrench> {
+/// A step of the processor, and the forces at its end.
+pub fn advance<S: Real>(scene: &mut Scene<S>) -> Vec<Wrench> {
     scene.steps += 1;
     act(f64::from(scene.steps) * scene.dt, &mut scene.inputs.tools);
     let Scene { model, state, solver, inputs, dt, .. } = scene;
@@ -105,7 +106,7 @@ impl OnDevice {
         self.gpu.wrenches().to_vec()
     }
 
-    fn residual(&self, scene: &Scene<f32>) -> f64 {
+    pub fn residual(&self, scene: &Scene<f32>) -> f64 {
         let mut balance = ForceBalance::default();
         let Scene { model, inputs, .. } = scene;
         self.gpu.force_balance(model, &self.state, inputs, &mut balance).expect("a balance");
@@ -114,7 +115,7 @@ impl OnDevice {
 }
 
 /// How far forces and torques are from the truth, of the largest force; torques over the size of the tissue [m].
-fn off(found: &[Wrench], truth: &[Wrench]) -> f64 {
+pub fn off(found: &[Wrench], truth: &[Wrench]) -> f64 {
     let most = truth.iter().map(|wrench| wrench.force.length()).fold(0.0, f64::max);
     let apart = found.iter().zip(truth).map(|(found, truth)| {
         let force = (found.force - truth.force).length();

@@ -12,17 +12,14 @@ table! {
     ];
     PREDICT, 40 each Vertex: [
         r(Points, ROW, Vertex),
-        r(Velocities, ROW, Vertex),
-        r(Previous, ROW, Vertex),
-        r(Predicted, ROW, Vertex),
-        r(ExternalForces, ROW, Vertex),
-        r(Targets, ROW, Vertex),
+        // Starts, masses, velocities, loads and holds.
+        r(VertexData, 5 * ROW, Vertex),
         w(Points, ROW, Vertex),
-        w(Previous, ROW, Vertex),
-        w(Predicted, ROW, Vertex),
+        w(VertexData, 2 * ROW, Vertex),
         // Steps that are guarded keep three starts.
-        w(Starts, 3 * ROW, Vertex).when(4),
+        w(VertexData, 3 * ROW, Vertex).when(4),
         r(Table, PIECE, Part),
+        r(Control, WORD, Part),
     ];
     UPDATE_VELOCITIES, 6 each Vertex: [
         r(Points, ROW, Vertex),
@@ -42,6 +39,8 @@ table! {
         r(Table, WORD, Tet),
         r(Table, ELEMENT, Element),
         r(Table, PIECE, Piece),
+        // Of samples that tools are near.
+        r(Loads, WORD, Sample),
         // Of inertia.
         r(VertexData, 3 * ROW, Vertex),
         // The other starts, and energies at the reference.

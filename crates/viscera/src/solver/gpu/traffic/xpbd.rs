@@ -5,6 +5,9 @@ use super::table::*;
 table! {
     REBASE, 25 each Vertex: [
         r(Loads, ROW, Corner),
+        // Whether tools are near to samples.
+        r(Loads, WORD, Sample).by(SampleCorner),
+        r(Table, 2 * WORD, SampleCorner),
         r(Points, ROW, Vertex),
         r(Previous, ROW, Vertex),
         r(Predicted, ROW, Vertex),
@@ -14,11 +17,20 @@ table! {
     ];
     RECOMPUTE_POSITIONS, 10 each Vertex: [
         r(Loads, ROW, Corner),
+        r(Loads, WORD, Sample).by(SampleCorner),
+        r(Table, 2 * WORD, SampleCorner),
         r(Points, ROW, Vertex),
         r(Predicted, ROW, Vertex),
         r(ExternalForces, ROW, Vertex),
         r(Table, WORD, Vertex),
         w(Points, ROW, Vertex),
+    ];
+    // Of a surface that nothing touches.
+    LOAD_CONTACTS, 1 each Sample: [
+        r(Loads, WORD, Sample),
+        w(Loads, ROW, Never),
+        r(Points, ROW, Never),
+        r(Table, WORD, Never),
     ];
     SPLIT_COPIES, 0 each Vertex: [
         r(Offsets, WORD, Vertex),

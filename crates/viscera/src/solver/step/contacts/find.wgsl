@@ -119,22 +119,10 @@ fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
 
 // The curvature of the energy at a place where tools are at the end of the step, without what may be negative in it.
 fn add_curvature(touching: Touching, place: vec3f, direct: ptr<function, vec3f>, mixed: ptr<function, vec3f>) {
-    let tool = tool_of(touching.marks);
-    let law = tools.kinds[tool].law;
-    let k = touching.stiffness * law.y;
     let met = meet(touching, AT_END, place);
-    let gap = law.z - met.distance;
-    var along = select(0.0, k, gap > 0.0);
-    along += select(0.0, (SECOND_STAGE - 1.0) * k, gap > 0.5 * law.z);
-    along *= met.slope * met.slope;
-    var across = 0.0;
-    let limit = touching.friction.w;
-    if limit > 0.0 {
-        let length = length_of(met.slip);
-        let gives_way = k * length > limit;
-        across = select(k, limit / select(1.0, length, gives_way), gives_way);
-        along += select(0.0, across, (touching.marks & IS_TIED) != 0u);
-    }
+    let stiffness = stiffness_of(touching, met);
+    let along = stiffness.x + stiffness.y;
+    let across = stiffness.z;
     let n = met.normal;
     *direct += vec3f(across) + n * n * (along - across);
     *mixed += vec3f(n.y * n.z, n.x * n.z, n.x * n.y) * (along - across);

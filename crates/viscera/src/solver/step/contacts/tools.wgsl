@@ -367,6 +367,25 @@ fn felt_of(touching: Touching, met: Met) -> Felt {
     return felt;
 }
 
+// The curvature of the energy [N/m] along the normal, what a tie adds to it, and a bound of it across: without what may be
+// negative in it.
+fn stiffness_of(touching: Touching, met: Met) -> vec3f {
+    let law = tools.kinds[tool_of(touching.marks)].law;
+    let k = touching.stiffness * law.y;
+    let gap = law.z - met.distance;
+    var along = select(0.0, k, gap > 0.0);
+    along += select(0.0, (SECOND_STAGE - 1.0) * k, gap > 0.5 * law.z);
+    var across = 0.0;
+    let limit = touching.friction.w;
+    if limit > 0.0 {
+        let length = length_of(met.slip);
+        let gives_way = k * length > limit;
+        across = select(k, limit / select(1.0, length, gives_way), gives_way);
+    }
+    let tie = select(0.0, across, (touching.marks & IS_TIED) != 0u);
+    return vec3f(along * (met.slope * met.slope), tie, across);
+}
+
 // Half the change of the square of what is above zero; `change`: that of the number.
 fn half_square_change(before: f32, after: f32, change: f32) -> f32 {
     let a = max(before, 0.0);
