@@ -132,9 +132,8 @@ pub(crate) fn beyond_devices(tools: impl Iterator<Item = bool>) -> Option<&'stat
     (count > MOST_TOOLS_ON_DEVICES).then_some("tools have 16 parts in all at most; use fewer")
 }
 
-/// Of other methods than the one that devices know contact with.
-pub(crate) const METHOD_ON_DEVICE: &str =
-    "only the quasi-Newton method computes contact with tools; use `method = \"quasi_newton\"`";
+/// Of other methods than those that devices know contact with.
+pub(crate) const METHOD_ON_DEVICE: &str = "only the quasi-Newton and the explicit method compute contact with tools; use `method = \"quasi_newton\"`";
 
 /// A tool that is faster than this [m/s], or goes further than so many of its radii in a step where those are more, was put
 /// elsewhere.

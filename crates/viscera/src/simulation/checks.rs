@@ -33,7 +33,7 @@ pub(super) fn check_tools<'a>(
         std::iter::repeat_n(tool.spring.is_some(), count)
     });
     let why = match method {
-        Method::QuasiNewton => beyond_devices(parts),
+        Method::QuasiNewton | Method::Explicit => beyond_devices(parts),
         _ => Some(METHOD_ON_DEVICE),
     };
     why.map_or(Ok(()), |why| Err(SimulationError::ToolsOnDevice { device, why }))

@@ -138,7 +138,10 @@ pub fn settings_change_while_tools_touch() {
     let mut run = on_device();
     advance(&mut run, 13);
     let refused = run.change(&setting("solver.method", "xpbd")).expect_err("no contact");
-    assert!(refused.to_string().contains("only the quasi-Newton method"), "{refused}");
+    assert!(
+        refused.to_string().contains("only the quasi-Newton and the explicit method"),
+        "{refused}"
+    );
     advance(&mut run, 1);
     let before = run.tool_forces()[0].clone();
     assert!(before.force[0].abs() > 0.01, "it is dragged: {before}");

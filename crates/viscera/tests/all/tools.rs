@@ -302,8 +302,8 @@ fn contact_is_where_it_is_asked_for_and_in_the_rebase() {
     let error = refused(BLOCK, &[on_device[0], ("solver.method", "xpbd")]);
     assert_eq!(
         error.to_string(),
-        "`device = \"gpu\"`: on a graphics processor only the quasi-Newton method computes contact with tools; use \
-         `method = \"quasi_newton\"`, or `device = \"cpu\"`"
+        "`device = \"gpu\"`: on a graphics processor only the quasi-Newton and the explicit method compute contact with \
+         tools; use `method = \"quasi_newton\"`, or `device = \"cpu\"`"
     );
     let published = [("solver.method", "xpbd"), ("solver.rebase", "false")];
     let error = refused(BLOCK, &published);

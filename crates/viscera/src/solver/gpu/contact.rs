@@ -25,10 +25,12 @@ fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
     if !IS_THERE {
         return Some("contact with tools was left out of this build; use `device = \"auto\"`");
     }
-    if method != Method::QuasiNewton {
-        return Some(METHOD_ON_DEVICE);
+    match method {
+        Method::QuasiNewton | Method::Explicit => {
+            beyond_devices(tools.iter().map(|tool| tool.held.is_some()))
+        }
+        _ => Some(METHOD_ON_DEVICE),
     }
-    beyond_devices(tools.iter().map(|tool| tool.held.is_some()))
 }
 
 impl GpuSolver {
@@ -84,7 +86,8 @@ impl GpuSolver {
         if let Some(why) = refuses(self.settings.method, tools) {
             return Err(StepError::ContactOnDevice { why });
         }
-        let share = self.solve_share();
+        // Small steps take place between the poses of a step.
+        let share = self.stability.is_none().then(|| self.solve_share());
         if let Some(words) = self.tools.all.new_distances(tools) {
             let rows = words.len() as u64 / u64::from(GRID_ROW);
             if rows > u64::from(self.device.limits().max_texture_dimension_2d) {

@@ -343,7 +343,8 @@ impl DeviceLayout {
         let guarded = settings.guards_steps();
         let solves = settings.method == Method::QuasiNewton;
         // Sums of the accelerations are read before pieces leave theirs.
-        let pieces = if guarded || solves { self.pieces.len() as u64 } else { 0 };
+        let touches = Samples::known(self.samples).is_some();
+        let pieces = if guarded || touches || solves { self.pieces.len() as u64 } else { 0 };
         // Lines of the search have places of their own, because workgroups write them while others still read the
         // pieces' sums; two a piece, because one dispatch reads shares and writes lengths. Energies at the
         // reference, one an element, stay for the whole step.
@@ -353,9 +354,12 @@ impl DeviceLayout {
             let each = 2 * PIECE_SUMS * pieces;
             return [lines, lines + each, lines + 2 * each];
         }
+        if !guarded {
+            return [lines; 3];
+        }
         let energies = lines + 2 * LINE_SUMS * pieces;
         let elements = (LANES * self.corners.len() + self.elements.len()) as u64;
-        [lines, energies, energies + if guarded { elements } else { 0 }]
+        [lines, energies, energies + elements]
     }
 
     /// Vertices from one range of the vertex data to the next.
@@ -426,7 +430,8 @@ pub(super) fn copy_offsets(layout: &Layout<f32>) -> Vec<u32> {
 
 /// Samples of the surface, where a method computes contact on devices.
 fn samples_of(layout: &Layout<f32>, settings: &SolverSettings) -> Option<Samples> {
-    Samples::new(layout).filter(|_| settings.method == Method::QuasiNewton)
+    let has_contact = matches!(settings.method, Method::QuasiNewton | Method::Explicit);
+    Samples::new(layout).filter(|_| has_contact)
 }
 
 /// The blocks where the tetrahedra of each law end.

@@ -114,7 +114,7 @@ impl OnDevice {
 }
 
 /// How far forces and torques are from the truth, of the largest force; torques over the size of the tissue [m].
-fn off(found: &[Wrench], truth: &[Wrench]) -> f64 {
+pub fn off(found: &[Wrench], truth: &[Wrench]) -> f64 {
     let most = truth.iter().map(|wrench| wrench.force.length()).fold(0.0, f64::max);
     let apart = found.iter().zip(truth).map(|(found, truth)| {
         let force = (found.force - truth.force).length();
