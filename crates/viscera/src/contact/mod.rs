@@ -132,10 +132,6 @@ pub(crate) fn beyond_devices(tools: impl Iterator<Item = bool>) -> Option<&'stat
     (count > MOST_TOOLS_ON_DEVICES).then_some("tools have 16 parts in all at most; use fewer")
 }
 
-/// Of the method that devices know no contact with.
-pub(crate) const METHOD_ON_DEVICE: &str =
-    "explicit steps compute no contact with tools; use `method = \"quasi_newton\"`";
-
 /// A tool that is faster than this [m/s], or goes further than so many of its radii in a step where those are more, was put
 /// elsewhere.
 const FASTEST: f64 = 10.0;

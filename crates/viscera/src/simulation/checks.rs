@@ -2,9 +2,9 @@
 
 use super::assemble::Assembly;
 use super::error::SimulationError;
-use crate::contact::{METHOD_ON_DEVICE, beyond_devices};
+use crate::contact::beyond_devices;
 use crate::scene::{Instrument, Scene};
-use crate::settings::{DeviceRequest, Method, SolverSettings};
+use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::StepError;
 
 /// Contact is computed where the scene asks for it to be.
@@ -12,19 +12,15 @@ pub(super) fn check_device(scene: &Scene, callers_device: bool) -> Result<(), Si
     match device_of(scene, callers_device) {
         Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
         Some(_) if scene.tools.is_empty() => Ok(()),
-        Some(_) => {
-            let method = scene.solver.chosen_on_device().method;
-            check_tools(scene, callers_device, method, scene.tools.iter())
-        }
+        Some(_) => check_tools(scene, callers_device, scene.tools.iter()),
         None => Ok(()),
     }
 }
 
-/// Where the scene asks for a device, that computes contact with these tools by this method.
+/// Where the scene asks for a device, that computes contact with these tools.
 pub(super) fn check_tools<'a>(
     scene: &Scene,
     callers_device: bool,
-    method: Method,
     tools: impl Iterator<Item = &'a Instrument>,
 ) -> Result<(), SimulationError> {
     let Some(device) = device_of(scene, callers_device) else { return Ok(()) };
@@ -32,11 +28,7 @@ pub(super) fn check_tools<'a>(
         let count = tool.parts.len() + tool.solids.len();
         std::iter::repeat_n(tool.spring.is_some(), count)
     });
-    let why = match method {
-        Method::Explicit => Some(METHOD_ON_DEVICE),
-        _ => beyond_devices(parts),
-    };
-    why.map_or(Ok(()), |why| Err(SimulationError::ToolsOnDevice { device, why }))
+    beyond_devices(parts).map_or(Ok(()), |why| Err(SimulationError::ToolsOnDevice { device, why }))
 }
 
 /// The device that is asked for, where one is.

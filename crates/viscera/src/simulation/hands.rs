@@ -264,7 +264,7 @@ impl<S: Real> Simulation<S> {
     ) -> Result<(), LiveError> {
         let all: Vec<&Instrument> = self.assembly.tools.iter().chain(new).collect();
         let all = all.iter().copied();
-        check_tools(&self.scene, self.callers_device, self.solver.method, all)?;
+        check_tools(&self.scene, self.callers_device, all)?;
         Ok(refuse_method(&self.solver).map_err(super::SimulationError::from)?)
     }
 

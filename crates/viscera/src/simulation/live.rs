@@ -323,7 +323,7 @@ impl<S: Real> Simulation<S> {
         check_settings(&solver).map_err(SimulationError::from)?;
         check_contact(&scene, &solver).map_err(SimulationError::from)?;
         if !scene.tools.is_empty() {
-            check_tools(&scene, on_device, solver.method, self.assembly.tools.iter())?;
+            check_tools(&scene, on_device, self.assembly.tools.iter())?;
         }
         self.refresh_state();
         let contact = self.contact_of(&self.state);

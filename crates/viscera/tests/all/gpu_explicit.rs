@@ -176,3 +176,53 @@ fn recovered_gradient_tetrahedra_are_refused_where_sweeps_are_asked_for() {
     let error = error.expect_err("kernels of linear ones only").to_string();
     assert!(error.contains("`elements = \"plain\"`"), "{error}");
 }
+
+/// A block that is fixed elastically, under a sudden force: in small steps of one length device and processor agree, and longer
+/// ones are further off. By default a device takes half of
+/// the stable step, the processor four fifths.
+#[test]
+fn small_steps_of_another_length_are_all_that_a_device_differs_by() {
+    let mesh = block([0.03, 0.03, 0.015], [3, 3, 2], 0.0);
+    let top: Vec<u32> =
+        (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.z > 0.0149).map(|(v, _)| v).collect();
+    fn model_of<S: Real>(mesh: &viscera::mesh::TetMesh) -> Model<S> {
+        let mut builder = viscera::model::ModelBuilder::new();
+        builder.add_body(mesh, &material(SNH, 1e4, 0.4)).expect("a body");
+        for (v, x) in (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.z < 1e-6) {
+            builder.add_attachment(v, *x, 125.0).expect("an attachment");
+        }
+        builder.build().expect("a model")
+    }
+    fn inputs<S: Real>(top: &[u32]) -> Inputs<S> {
+        let force = (vec3(0.2, 0.0, 0.5) * (1.0 / top.len() as f64)).cast();
+        Inputs { forces: top.iter().map(|&v| (v, force)).collect(), ..Inputs::default() }
+    }
+    let (model, model64) = (model_of::<f32>(&mesh), model_of::<f64>(&mesh));
+    let of = |explicit_safety: f64| SolverSettings {
+        explicit_safety,
+        ..explicit(Colors::Unlimited, Elements::Plain)
+    };
+    let [truth, short, usual] = [0.03, 0.5, 0.8].map(|safety| {
+        let (mut solver, mut state) =
+            (Solver::new(&model64, &of(safety)), State::at_rest(&model64));
+        for _ in 0..5 {
+            solver.step(&model64, &mut state, &inputs(&top), 0.005).expect("a legal step");
+        }
+        state.positions
+    });
+    let mut gpu = GpuSolver::new(device::device(), &model, &of(0.8)).expect("a model that fits");
+    for _ in 0..5 {
+        gpu.step(&model, &inputs(&top), 0.005).expect("a legal step");
+    }
+    let mut read = State::at_rest(&model);
+    gpu.read(&model, &mut read).expect("a device");
+    let moved = largest(&model.rest_positions, &truth);
+    let [of_device, of_short, of_usual] =
+        [largest(&read.positions, &truth), largest(&short, &truth), largest(&usual, &truth)];
+    let same = largest(&read.positions, &short);
+    println!(
+        "{same:.1e} m; of {moved:.1e} m off by {of_device:.1e}, {of_short:.1e}, {of_usual:.1e}"
+    );
+    assert!(moved > 1e-3 && same < 1e-6, "{same:e} of {moved:e} m");
+    assert!(of_device < 0.02 * moved && of_usual > 1.2 * of_short, "{of_device:e}, {of_usual:e}");
+}

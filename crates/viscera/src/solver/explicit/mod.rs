@@ -21,6 +21,8 @@ mod present;
 mod spectrum;
 mod stability;
 pub mod stage;
+#[cfg(feature = "gpu")]
+pub mod texts;
 
 use crate::layout::{Before, Layout, Moments, Part};
 use crate::scalar::lanes::Point;

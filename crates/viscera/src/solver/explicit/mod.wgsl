@@ -81,8 +81,8 @@ fn store_start_strain(block: u32, lane: u32, strain: array<f32, 6>) {
     }
 }
 
-// h^2 times the forces of tetrahedra and then of other elements, into a place for each corner. Counts the small
-// step, which the other kernels only read.
+// h^2 times the forces of tetrahedra and then of other elements, into a place for each corner, and from `job.first` on of samples.
+// Counts the small step, which the other kernels only read.
 @compute @workgroup_size(64)
 fn load_forces(
     @builtin(global_invocation_id) id: vec3u,
@@ -96,8 +96,10 @@ fn load_forces(
         load_recovered(thread / LANES, thread % LANES);
     } else if thread < job.tet_count {
         load_tet(thread / LANES, thread % LANES);
-    } else if thread < job.count {
+    } else if thread < job.first {
         load_element(element_row(thread - job.tet_count));
+    } else if thread < job.count {
+        load_sample(thread - job.first);
     }
 }
 
@@ -178,9 +180,10 @@ fn advance_explicit(
     let x = points[v].xyz;
     let pull = on_vertex.xyz + (hold.xyz - x) * hold.w;
     let impulse = (gather(v).xyz + recovered_force(v)) * number(small + SMALL_INVERSE_DT) + pull * h;
-    let velocity = vertex_data_of(VELOCITIES, v).xyz + (impulse * on_vertex.w + frame.gravity * h);
+    let before = vertex_data_of(VELOCITIES, v).xyz;
+    let velocity = pushed_velocity(v, h, on_vertex.w, before, impulse * on_vertex.w + frame.gravity * h);
     let ahead = number(small + SMALL_AHEAD);
-    let place = x - vertex_data_of(VELOCITIES, v).xyz * ahead;
+    let place = x - before * ahead;
     put_vertex_data(VELOCITIES, v, vec4f(velocity, 0.0));
     points[v] = vec4f(place + velocity * select(h + ahead, 0.5 * h, is_last), 0.0);
 }
@@ -210,7 +213,8 @@ fn end_explicit(
         let middle = x - vertex_data_of(VELOCITIES, v).xyz * time;
         let pull = (vertex_data_of(TARGETS, v).xyz - middle) * vertex_data_of(TARGETS, v).w * frame.squared_dt;
         let steps = frame.dt * number(small + SMALL_INVERSE_DT);
-        back = ((gather(v).xyz + recovered_force(v)) * (steps * steps) + pull) * on_vertex.w;
+        let force = gather(v).xyz + recovered_force(v) + contact_load(v);
+        back = (force * (steps * steps) + pull) * on_vertex.w;
     }
     put_vertex_data(PREDICTED, v, vec4f(x - back, mass));
 }

@@ -15,9 +15,17 @@ fn recovered_dt(part: u32) -> f32 {
     return number(small_row(part) + SMALL_DT);
 }
 
-// Where a vertex is or, before the first small step, where it was one small step ago.
+// Modes beside small steps, which look where vertices are: for viscosity, where they were one small step before the first; for
+// the energy of the step, where they are at its start, pins moved, and how that changes to its end.
+const BEFORE_MOTION: u32 = 1u;
+const OF_ENERGY: u32 = 2u;
+
 fn place_in_motion(v: u32, h: f32) -> vec3f {
-    if job.mode == 0u {
+    if job.mode == OF_ENERGY {
+        let is_pinned = vertex_data_of(EXTERNAL_FORCES, v).w == 0.0;
+        return select(vertex_data_of(PREVIOUS, v).xyz, vertex_data_of(TARGETS, v).xyz, is_pinned);
+    }
+    if job.mode != BEFORE_MOTION {
         return points[v].xyz;
     }
     return vertex_data_of(PREVIOUS, v).xyz - vertex_data_of(PREDICTED, v).xyz * (0.5 * h);
@@ -34,21 +42,34 @@ fn recover_places(
         return;
     }
     let part = table[recovered_table(RECOVERED_GROUP_PARTS) + group];
-    if agree(!recovered_acts(part), local) {
+    if agree(!recovered_acts(part) && job.mode != OF_ENERGY, local) {
         return;
     }
     let h = recovered_dt(part);
     let n = 8u * group + local / LANES_OF_PLACE;
-    let own = place_in_motion(place_of_number(n).vertex, h);
+    let own_vertex = place_of_number(n).vertex;
+    let own = place_in_motion(own_vertex, h);
+    let own_way = points[own_vertex].xyz - own;
     var gradient = mat3x3f();
+    var change = mat3x3f();
     let offsets = recovered_table(RECOVERED_RING_OFFSETS) + n;
     let end = table[offsets + 1u];
     for (var i = table[offsets] + local % LANES_OF_PLACE; i < end; i += LANES_OF_PLACE) {
         let row = recovered_table(RECOVERED_RINGS) + 4u * i;
         let b = vec3f(number(row + 1u), number(row + 2u), number(row + 3u));
-        gradient += recovered_outer(place_in_motion(table[row], h) - own, b);
+        let x = place_in_motion(table[row], h);
+        gradient += recovered_outer(x - own, b);
+        if job.mode == OF_ENERGY {
+            change += recovered_outer((points[table[row]].xyz - x) - own_way, b);
+        }
     }
     gradient = share_matrix(gradient, local);
+    if job.mode == OF_ENERGY {
+        change = share_matrix(change, local);
+        if local % LANES_OF_PLACE == 0u {
+            put_matrix(CHANGES, n, change, vec3f());
+        }
+    }
     if local % LANES_OF_PLACE == 0u {
         if job.mode == 0u && recovered_count(RECOVERED_IS_VISCOUS) != 0u {
             put_matrix(STARTS, n, matrix_of(GRADIENTS, n), vec3f());

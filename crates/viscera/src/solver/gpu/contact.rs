@@ -6,10 +6,9 @@ use super::error::GpuError;
 use super::reading::read;
 use super::slots::Slot;
 use super::solver::GpuSolver;
-use crate::contact::{METHOD_ON_DEVICE, Tool, Wrench, beyond_devices};
+use crate::contact::{Tool, Wrench, beyond_devices};
 use crate::model::Model;
 use crate::scalar::vec3;
-use crate::settings::Method;
 use crate::solver::error::StepError;
 use crate::solver::step::contacts::on_device::{
     DeviceTools, GRID_ROW, IS_THERE, Samples, SentTools, ToolRecords,
@@ -21,12 +20,9 @@ const TOO_FINE: &str =
     "distances of the tools' surfaces do not fit; use a thicker contact, whose cells are larger";
 
 /// Why a device cannot compute contact with these tools.
-fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
+fn refuses(tools: &[Tool]) -> Option<&'static str> {
     if !IS_THERE {
         return Some("contact with tools was left out of this build; use `device = \"auto\"`");
-    }
-    if method == Method::Explicit {
-        return Some(METHOD_ON_DEVICE);
     }
     beyond_devices(tools.iter().map(|tool| tool.held.is_some()))
 }
@@ -77,17 +73,18 @@ impl GpuSolver {
             return match tools {
                 [] => Ok(()),
                 _ => Err(StepError::ContactOnDevice {
-                    why: refuses(self.settings.method, tools).unwrap_or("there are no samples"),
+                    why: refuses(tools).unwrap_or("there are no samples"),
                 }),
             };
         }
-        if let Some(why) = refuses(self.settings.method, tools) {
+        if let Some(why) = refuses(tools) {
             return Err(StepError::ContactOnDevice { why });
         }
         if !tools.is_empty() && !self.settings.takes_contact() {
             return Err(StepError::ContactNeedsRebase);
         }
-        let share = self.solve_share();
+        // Small steps take place between the poses of a step.
+        let share = self.stability.is_none().then(|| self.solve_share());
         if let Some(words) = self.tools.all.new_distances(tools) {
             let rows = words.len() as u64 / u64::from(GRID_ROW);
             if rows > u64::from(self.device.limits().max_texture_dimension_2d) {

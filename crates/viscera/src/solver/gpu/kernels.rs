@@ -8,6 +8,7 @@ use crate::elements::TetForm;
 use crate::elements::text::kernel_text;
 use crate::elements::wgsl;
 use crate::layout::HAS_CLUSTERS;
+use crate::solver::explicit::texts::{Which, texts as explicit};
 use crate::solver::quasi_newton::on_device::IS_THERE;
 use crate::solver::step::tissue::{TISSUE_WGSL, VISCOUS_WGSL};
 
@@ -44,6 +45,10 @@ pub enum File {
     HistoryElements,
     Explicit,
     ExplicitRecovered,
+    ExplicitTouched,
+    TouchedRecovered,
+    ExplicitEnergy,
+    EnergyRecovered,
     Evaluate,
     Search,
     Take,
@@ -160,6 +165,23 @@ kernels! {
         [Points Loads Control VertexData Table Recovery];
     END_EXPLICIT_RECOVERED = ExplicitRecovered "end_explicit" 64
         [Points Loads VertexData Table Recovery];
+    LOAD_TOUCHED = ExplicitTouched "load_forces" 64
+        [Tets Points Loads StartStrain Control VertexData Table];
+    ADVANCE_TOUCHED = ExplicitTouched "advance_explicit" 64 [Points Loads Control VertexData Table];
+    END_TOUCHED = ExplicitTouched "end_explicit" 64 [Points Loads VertexData Table];
+    SLIP_CONTACTS = ExplicitTouched "slip_contacts" 64 [Points Loads Table];
+    LOAD_TOUCHED_RECOVERED = TouchedRecovered "load_forces" 64
+        [Tets Points Loads StartStrain Control VertexData Table Recovery];
+    ADVANCE_TOUCHED_RECOVERED = TouchedRecovered "advance_explicit" 64
+        [Points Loads Control VertexData Table Recovery];
+    END_TOUCHED_RECOVERED = TouchedRecovered "end_explicit" 64 [Points Loads VertexData Table Recovery];
+    MEASURE_ENERGY = ExplicitEnergy "measure_energy" 256 [Tets Points Loads PartialSums Control VertexData Table];
+    LIMIT_ENERGY = ExplicitEnergy "limit_energy" 256 [Points PartialSums Control VertexData Table];
+    MEASURE_RECOVERED_ENERGY = EnergyRecovered "measure_energy" 256
+        [Tets Points Loads PartialSums Control VertexData Table Recovery];
+    AVERAGE_ENERGIES = EnergyRecovered "average_energies" 256 [Table Recovery];
+    LIMIT_RECOVERED_ENERGY = EnergyRecovered "limit_energy" 256
+        [Points PartialSums Control VertexData Table Recovery];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
     EVALUATE = Evaluate "evaluate" 256
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
@@ -303,10 +325,7 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::HistoryElements => {
             [vec![history], elements(kernel_text!("../xpbd/history_elements.wgsl"))].concat()
         }
-        File::Explicit => {
-            let own = [PLAIN, kernel_text!("../explicit/recovered_none.wgsl")];
-            [laws(), own.to_vec(), elements(kernel_text!("../explicit/mod.wgsl"))].concat()
-        }
+        File::Explicit => small_steps(File::Explicit, &elements(""), &[]),
         File::Evaluate => guard(own(kernel_text!("../step/guard_evaluate.wgsl"))),
         File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
         File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
@@ -337,14 +356,6 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
         }
         File::Invert => {
             vec![levels, kernel_text!("../quasi_newton/preconditioner/invert.wgsl")]
-        }
-        File::ExplicitRecovered => {
-            let own = [
-                forces,
-                kernel_text!("../explicit/recovered.wgsl"),
-                kernel_text!("../explicit/mod.wgsl"),
-            ];
-            [laws(), pieces(), tables.to_vec(), own.to_vec()].concat()
         }
         File::EvaluateTrial => {
             let own = [PLAIN, none, TOOLS, samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
@@ -381,8 +392,20 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
             [pieces(), vec![TOOLS, kernel_text!("../step/contacts/end.wgsl")]].concat()
         }
         File::Pressures if SHOWS_VALUES => vec![TOOLS, kernel_text!("pressures.wgsl")],
-        _ => Vec::new(),
+        // Of the explicit method.
+        _ => small_steps(file, &pieces(), &[&tables[..], &[forces]].concat()),
     }
+}
+
+/// Files of the explicit method, behind what they share, with those `of` recovered-gradient tetrahedra.
+fn small_steps(file: File, all: &[&'static str], of: &[&'static str]) -> Vec<&'static str> {
+    let [touched, energy] = [File::TouchedRecovered, File::EnergyRecovered];
+    let which = Which {
+        limits_energy: [File::ExplicitEnergy, energy].contains(&file),
+        touches: [File::ExplicitTouched, touched].contains(&file),
+        is_recovered: [File::ExplicitRecovered, touched, energy].contains(&file),
+    };
+    explicit(which, &[&laws()[..], all].concat(), of, [PLAIN, TOOLS])
 }
 
 fn laws() -> Vec<&'static str> {
@@ -428,7 +451,12 @@ fn key(kernel: &Kernel, variant: Variant) -> String {
         format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
     } else if matches!(
         kernel.file,
-        File::ExplicitRecovered | File::EvaluateRecovered | File::EndRecovered
+        File::ExplicitRecovered
+            | File::ExplicitTouched
+            | File::TouchedRecovered
+            | File::EnergyRecovered
+            | File::EvaluateRecovered
+            | File::EndRecovered
     ) {
         // Some have the names of those for plain tetrahedra, or of another method.
         format!("{} {:?}", kernel.entry, kernel.file)

@@ -227,7 +227,7 @@ impl DeviceLayout {
                 *slot += offsets[vertex as usize];
             }
         }
-        let samples = samples_of(layout, settings);
+        let samples = Samples::new(layout);
         let with_samples = Samples::known(samples).is_some();
         let (members, pieces) = pieces(layout, &elements, &by_kind, with_samples);
         let parts = Parts::new(layout, settings, &pieces);
@@ -343,7 +343,8 @@ impl DeviceLayout {
         let guarded = settings.guards_steps();
         let solves = settings.method == Method::QuasiNewton;
         // Sums of the accelerations are read before pieces leave theirs.
-        let pieces = if guarded || solves { self.pieces.len() as u64 } else { 0 };
+        let touches = Samples::known(self.samples).is_some();
+        let pieces = if guarded || touches || solves { self.pieces.len() as u64 } else { 0 };
         // Lines of the search have places of their own, because workgroups write them while others still read the
         // pieces' sums; two a piece, because one dispatch reads shares and writes lengths. Energies at the
         // reference, one an element, stay for the whole step.
@@ -353,10 +354,13 @@ impl DeviceLayout {
             let each = 2 * PIECE_SUMS * pieces;
             return [lines, lines + each, lines + 2 * each];
         }
+        if !guarded {
+            return [lines; 3];
+        }
         let energies = lines + 2 * LINE_SUMS * pieces;
         let samples = Samples::known(self.samples).map_or(0, |samples| samples.count as usize);
         let elements = (LANES * self.corners.len() + self.elements.len() + samples) as u64;
-        [lines, energies, energies + if guarded { elements } else { 0 }]
+        [lines, energies, energies + elements]
     }
 
     /// Vertices from one range of the vertex data to the next.
@@ -423,11 +427,6 @@ pub(super) fn copy_offsets(layout: &Layout<f32>) -> Vec<u32> {
         offsets[part.vertices.clone()].iter_mut().for_each(|first| *first |= WHOLE);
     }
     offsets
-}
-
-/// Samples of the surface, where a method computes contact on devices.
-fn samples_of(layout: &Layout<f32>, settings: &SolverSettings) -> Option<Samples> {
-    Samples::new(layout).filter(|_| settings.method != Method::Explicit)
 }
 
 /// The blocks where the tetrahedra of each law end.

@@ -8,6 +8,7 @@ mod inside;
 mod meshes;
 mod motion;
 pub mod on_device;
+pub mod on_device_explicit;
 mod on_device_robust;
 mod on_device_xpbd;
 mod organs;

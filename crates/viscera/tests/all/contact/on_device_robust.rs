@@ -14,7 +14,7 @@ use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::rigid::{axis_times_sine, rotation_matrix};
 use viscera::scalar::{Vec3, vec3};
-use viscera::settings::{Elements, Integrator, Method, SolverSettings};
+use viscera::settings::{Elements, Integrator, SolverSettings};
 use viscera::solver::gpu::GpuSolver;
 use viscera::solver::{Inputs, Pin, StepError};
 use viscera::state::{ContactState, State};
@@ -81,14 +81,8 @@ fn what_devices_cannot_do_is_refused() {
         }
     };
     let quasi_newton = settings(ALL[0]);
-    let method = Method::Explicit;
-    let plain = Elements::Plain;
-    let explicit = SolverSettings { method, elements: plain, ..SolverSettings::default() };
-    let words = refused(&explicit, tools());
-    assert!(words.contains("explicit steps"), "{words}");
-    assert!(words.contains("method = \"quasi_newton\"") && words.contains("cpu"), "{words}");
-    let many = vec![Tool::new(Shape::HalfSpace); 17];
-    assert!(refused(&quasi_newton, many).contains("16 parts"));
+    let words = refused(&quasi_newton, vec![Tool::new(Shape::HalfSpace); 17]);
+    assert!(words.contains("16 parts") && words.contains("cpu"), "{words}");
     let mut held = tools();
     held[0].held = Some(viscera::contact::Held {
         body: 0,
@@ -100,13 +94,13 @@ fn what_devices_cannot_do_is_refused() {
 
 /// Energy that jaws seem to have put into tissue, and what the tissue has, computed outside: mean forces along the way.
 #[derive(Default)]
-struct Account {
-    work: f64,
+pub struct Account {
+    pub work: f64,
     before: Vec<(Tool, Wrench)>,
 }
 
 impl Account {
-    fn add(&mut self, tools: &[Tool], wrenches: &[Wrench]) {
+    pub fn add(&mut self, tools: &[Tool], wrenches: &[Wrench]) {
         for ((start, first), (end, last)) in self.before.iter().zip(tools.iter().zip(wrenches)) {
             let way = end.pose.translation - start.pose.translation;
             let turn = end.pose.rotation * start.pose.rotation.transpose();

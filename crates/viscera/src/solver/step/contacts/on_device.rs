@@ -11,7 +11,7 @@ use super::{Contacts, Gift};
 use crate::contact::distance_grid::{BRICK, DistanceGrid, WHOLE};
 use crate::contact::{Friction, MOST_TOOLS_ON_DEVICES, Shape, Side, Tool, Touch, Touching, Wrench};
 use crate::layout::{LaidSample, Layout};
-use crate::scalar::rigid::{RigidTransform, axis_times_sine};
+use crate::scalar::rigid::{RigidTransform, axis_times_sine, rotation_vector};
 use crate::scalar::{Vec3, vec3};
 use crate::state::ContactState;
 
@@ -171,17 +171,23 @@ fn kind_and_lengths(shape: &Shape) -> (f64, [f64; 4]) {
 }
 
 impl ToolMotion {
-    /// In a step that begins at a pose; its first solve takes a share of it.
-    fn new(tool: &Tool, start: &RigidTransform, share: f64, has_jumped: bool) -> Self {
+    /// In a step that begins at a pose; its first solve takes a share of it. Where there are no solves the turn, as axis times
+    /// angle, is in that one's place.
+    fn new(tool: &Tool, start: &RigidTransform, share: Option<f64>, has_jumped: bool) -> Self {
         let pose = |pose: RigidTransform| {
             let [x, y, z] = pose.rotation.columns;
             let t = pose.translation;
             [(x, t.x), (y, t.y), (z, t.z)].map(|(column, t)| with(column, t as f32))
         };
         let way = tool.pose.translation - start.translation;
-        let turn = axis_times_sine(&(tool.pose.rotation * start.rotation.transpose()));
+        let turned = tool.pose.rotation * start.rotation.transpose();
+        let turn = axis_times_sine(&turned);
+        let between = match share {
+            Some(share) => pose(start.towards(&tool.pose, share)),
+            None => [with(rotation_vector(&turned), 0.0), [0.0; 4], [0.0; 4]],
+        };
         Self {
-            poses: [*start, start.towards(&tool.pose, share), tool.pose].map(pose),
+            poses: [pose(*start), between, pose(tool.pose)],
             way: with(way, f32::from(u8::from(tool.is_locked))),
             turn: with(turn, f32::from(u8::from(has_jumped))),
         }
@@ -288,8 +294,8 @@ impl DeviceTools {
         found.map_or(0, |(_, first)| *first)
     }
 
-    /// Tools in a step of `dt` [s], of which the first solve takes a share.
-    pub fn begin(&mut self, tools: &[Tool], dt: f64, share: f64) -> SentTools {
+    /// Tools in a step of `dt` [s], of which the first solve takes a share where there is one.
+    pub fn begin(&mut self, tools: &[Tool], dt: f64, share: Option<f64>) -> SentTools {
         self.tools.clear();
         self.tools.extend_from_slice(tools);
         (self.starts, self.jumped) = super::found::starts(tools, &self.poses, dt).unzip();

@@ -15,7 +15,7 @@
 // Of a tool in a step.
 struct ToolMotion {
     // To the world from the tool's frame at the start of the step, at the end of its first solve, at its end: columns of the
-    // rotation, in w a component of the translation [m].
+    // rotation, in w a component of the translation [m]. Explicit steps have their turn in the place of the second.
     poses: array<array<vec4f, 3>, 3>,
     // Way of its origin in the step [m]; whether it is locked.
     way: vec4f,
