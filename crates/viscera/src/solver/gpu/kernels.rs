@@ -2,6 +2,7 @@
 
 use super::bindings::{storage_entry, uniform_layout};
 use super::device::{Device, Pipeline};
+use super::meetings;
 use super::slots::Slot;
 use crate::elements::TetForm;
 use crate::elements::text::kernel_text;
@@ -58,6 +59,9 @@ pub enum File {
     EndRecovered,
     FindContacts,
     EndContacts,
+    Skin,
+    SortMeetings,
+    EndMeetings,
 }
 
 /// Choices that the text of a file depends on, beside the kernel.
@@ -202,6 +206,13 @@ kernels! {
         [Points Loads Control VertexData Table];
     END_CONTACTS = EndContacts "end_contacts" 256 [Points Loads PartialSums VertexData Table];
     REPORT_TOOLS = EndContacts "report_tools" 256 [PartialSums Table];
+    PLACE_SKIN = Skin "place_skin" 64 [Points Loads Table];
+    TURN_SKIN = Skin "turn_skin" 64 [Loads Table];
+    BOX_SKIN = Skin "box_skin" 64 [Loads Table];
+    PREPARE_SKIN = Skin "prepare_skin" 256 [Points Loads VertexData Table];
+    FIND_MEETINGS = Skin "find_meetings" 64 [Points Loads Control VertexData Table];
+    SORT_MEETINGS = SortMeetings "sort_meetings" 128 [Loads Table];
+    END_MEETINGS = EndMeetings "end_meetings" 64 [Points Loads Table];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
@@ -299,7 +310,6 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
 
 /// The files of kernels that builds without `gpu-solves` leave out.
 fn files_of_solves(file: File) -> Vec<&'static str> {
-    let own = |file| vec![file];
     let levels = kernel_text!("../quasi_newton/preconditioner/levels.wgsl");
     let solve = |own: Vec<&'static str>| {
         [laws(), pieces(), vec![kernel_text!("../quasi_newton/progress.wgsl")], own].concat()
@@ -310,7 +320,10 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
     let samples = kernel_text!("../step/contacts/solve.wgsl");
     let samples_end = kernel_text!("../step/contacts/solve_end.wgsl");
     match file {
-        File::Begin => solve(own(kernel_text!("../quasi_newton/begin.wgsl"))),
+        File::Begin => {
+            let own = kernel_text!("../quasi_newton/begin.wgsl");
+            solve([meetings::IN_BEGIN, &[own]].concat())
+        }
         File::Refresh => {
             let own = kernel_text!("../quasi_newton/preconditioner/refresh.wgsl");
             [laws(), vec![levels, own]].concat()
@@ -327,38 +340,32 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
             [laws(), pieces(), tables.to_vec(), own.to_vec()].concat()
         }
         File::EvaluateTrial => {
-            let own = [PLAIN, none, TOOLS, samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
-            solve(own.to_vec())
+            let own = [samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
+            solve([&[PLAIN, none, TOOLS], meetings::IN_TRIAL, &own].concat())
         }
         File::EvaluateRecovered => {
-            let own = [
-                forces,
-                kernel_text!("../quasi_newton/recovered.wgsl"),
-                TOOLS,
-                samples,
-                kernel_text!("../quasi_newton/evaluate.wgsl"),
-            ];
-            solve([tables.to_vec(), own.to_vec()].concat())
+            let first = [forces, kernel_text!("../quasi_newton/recovered.wgsl"), TOOLS];
+            let own = [samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
+            solve([&tables, &first[..], meetings::IN_TRIAL, &own].concat())
         }
         File::Apply => vec![levels, kernel_text!("../quasi_newton/preconditioner/apply.wgsl")],
         File::Direction => solve(vec![levels, kernel_text!("../quasi_newton/direction.wgsl")]),
         File::End => {
-            let own = [PLAIN, none, TOOLS, samples_end, kernel_text!("../quasi_newton/end.wgsl")];
-            solve(own.to_vec())
+            let own = [samples_end, kernel_text!("../quasi_newton/end.wgsl")];
+            solve([&[PLAIN, none, TOOLS], meetings::IN_END, &own].concat())
         }
         File::EndRecovered => {
-            let own = [
-                kernel_text!("../quasi_newton/recovered_end.wgsl"),
-                TOOLS,
-                samples_end,
-                kernel_text!("../quasi_newton/end.wgsl"),
-            ];
-            solve([tables.to_vec(), own.to_vec()].concat())
+            let first = [kernel_text!("../quasi_newton/recovered_end.wgsl"), TOOLS];
+            let own = [samples_end, kernel_text!("../quasi_newton/end.wgsl")];
+            solve([&tables, &first[..], meetings::IN_END, &own].concat())
         }
         File::FindContacts => vec![TOOLS, kernel_text!("../step/contacts/find.wgsl")],
         File::EndContacts => {
             [pieces(), vec![TOOLS, kernel_text!("../step/contacts/end.wgsl")]].concat()
         }
+        File::Skin => [&[TOOLS], meetings::FIND].concat(),
+        File::SortMeetings => meetings::SORT.to_vec(),
+        File::EndMeetings => [&[TOOLS], meetings::END].concat(),
         _ => Vec::new(),
     }
 }

@@ -32,6 +32,7 @@ mod inputs;
 pub mod kernels;
 mod layout;
 pub(in crate::solver) mod limits;
+mod meetings;
 mod members;
 mod outgoing;
 mod parts;

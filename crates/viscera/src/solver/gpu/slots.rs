@@ -48,6 +48,8 @@ pub enum Slot {
     StageStart,
     Contact,
     ToolSums,
+    Meetings,
+    Torn,
 }
 
 impl Slot {

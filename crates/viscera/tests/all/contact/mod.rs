@@ -9,6 +9,7 @@ mod meshes;
 mod motion;
 pub mod on_device;
 mod on_device_robust;
+mod on_device_tissue;
 mod organs;
 mod passes;
 mod refused;
