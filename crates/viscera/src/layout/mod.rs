@@ -8,6 +8,8 @@ mod cells;
 mod clusters;
 mod domains;
 pub(crate) mod elements;
+#[cfg(feature = "gpu")]
+mod joined;
 pub(crate) mod lattice;
 mod order;
 mod parts;
@@ -27,6 +29,8 @@ pub(crate) use clusters::{HAS_CLUSTERS, SetClusters};
 pub use domains::{Domains, Smoothing};
 pub(crate) use elements::{Before, Moments};
 pub use elements::{ElementSet, ElementSets};
+#[cfg(feature = "gpu")]
+pub(crate) use joined::Joined;
 use order::{Order, cell_by_cell, renumbered_copies};
 use parts::Laid;
 pub(crate) use parts::Part;
@@ -95,6 +99,30 @@ impl<S: Real> Layout<S> {
             return Self { revision: !model.revision, ..Self::of(&Model::nothing(), settings) };
         }
         Self::of(model, settings)
+    }
+
+    /// As [`Layout::new`], for a device: where that computes how tissue meets tissue, parts that may touch are one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn on_device(model: &Model<S>, settings: &SolverSettings) -> Self {
+        let meets = settings.meets_on_device() && (model.meets_itself() || model.ties_bodies());
+        if meets
+            && model.is_as_built()
+            && let Some((one, joined)) = Joined::new(model)
+        {
+            let mut layout = Self::of(&one, settings);
+            let joined = joined.numbered(model, &layout.numbering);
+            if let Some(skin) = &mut layout.skin {
+                skin.joined = Some(joined);
+            }
+            return layout;
+        }
+        Self::new(model, settings)
+    }
+
+    /// Where parts of the model are one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn joined(&self) -> Option<&Joined> {
+        self.skin.as_ref()?.joined.as_ref()
     }
 
     fn of(model: &Model<S>, settings: &SolverSettings) -> Self {

@@ -1,5 +1,7 @@
 //! The surface on which tissue meets tissue, in the solver's numbering.
 
+#[cfg(feature = "gpu")]
+use super::joined::Joined;
 use super::samples::{LaidSample, laid};
 use crate::contact::skin::{Tie, mean};
 use crate::contact::tree::Tree;
@@ -27,6 +29,9 @@ pub(crate) struct LaidSkin {
     pub ties: Vec<(u32, u32)>,
     /// Of the skin at rest.
     pub tree: Tree,
+    /// Where parts of the model are one.
+    #[cfg(feature = "gpu")]
+    pub joined: Option<Joined>,
 }
 
 impl LaidSkin {
@@ -71,6 +76,8 @@ impl LaidSkin {
             sample_parts,
             ties,
             skin,
+            #[cfg(feature = "gpu")]
+            joined: None,
         })
     }
 
@@ -105,9 +112,20 @@ impl LaidSkin {
         first(part)..first(part + 1)
     }
 
+    #[cfg(feature = "gpu")]
+    fn joined_bytes(&self) -> usize {
+        self.joined.as_ref().map_or(0, Joined::bytes)
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn joined_bytes(&self) -> usize {
+        0
+    }
+
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        self.skin.bytes()
+        self.joined_bytes()
+            + self.skin.bytes()
             + size_of_val(&self.samples[..])
             + size_of_val(&self.sample_parts[..])
             + size_of_val(&self.parts[..])

@@ -205,7 +205,7 @@ impl<S: Real> Model<S> {
         mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu) / sample.edge
     }
 
-    /// Whether tissue meets other tissue than its own body's, or is tied to it: what only the CPU computes.
+    /// Whether tissue meets other tissue than its own body's, or is tied to it: what not everything computes.
     pub(crate) fn ties_bodies(&self) -> bool {
         let meets = self.tissue_contact.bodies && self.bodies.len() > 1;
         !self.skin.ties.is_empty() || (meets && !self.skin.triangles.is_empty())

@@ -2,6 +2,17 @@
 
 use super::{DeviceRequest, Elements, Method, SolverSettings};
 
+/// Whether this build computes on graphics processors how tissue meets tissue. Pages leave it out, whose size is limited.
+pub(crate) const HAS_MEETINGS: bool =
+    cfg!(all(feature = "gpu-solves", not(target_arch = "wasm32")));
+
+impl SolverSettings {
+    /// Whether a graphics processor computes by this method how tissue meets tissue.
+    pub(crate) fn meets_on_device(&self) -> bool {
+        HAS_MEETINGS && self.method == Method::QuasiNewton
+    }
+}
+
 impl SolverSettings {
     /// The settings in force, as far as they tell it alone: on a device that is asked for by name "auto" is "quasi_newton", or
     /// "xpbd" in a build without it. Elsewhere it stays what it is: a scene chooses, mostly "quasi_newton".

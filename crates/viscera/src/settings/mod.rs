@@ -17,6 +17,7 @@ mod tree;
 pub use accuracy::{Accuracy, FINEST, ROUGHEST};
 pub use device::DeviceRequest;
 pub use elements::Elements;
+pub(crate) use foreseen::HAS_MEETINGS;
 pub use solver::{
     Acceleration, AndersonGuard, AndersonOn, Clusters, Colors, Count, Integrator, MOST_HISTORY,
     MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,

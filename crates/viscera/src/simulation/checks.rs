@@ -10,7 +10,11 @@ use crate::solver::StepError;
 /// Contact is computed where the scene asks for it to be.
 pub(super) fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
     match device_of(scene, callers_device) {
-        Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
+        Some(device)
+            if bodies_meet(scene) && !scene.solver.chosen_on_device().meets_on_device() =>
+        {
+            Err(SimulationError::BodiesOnDevice { device })
+        }
         Some(_) if scene.tools.is_empty() => Ok(()),
         Some(_) => check_tools(scene, callers_device, scene.tools.iter()),
         None => Ok(()),

@@ -22,7 +22,10 @@ impl<S: Real> Backend<S> {
         offered: &Offered,
     ) -> Result<Self, SimulationError> {
         let mut chosen = Self::chosen(model, settings, ready, offered)?;
-        let takes_contact = chosen.device().is_none() && settings.takes_contact();
+        let takes_contact = match chosen.device() {
+            None => settings.takes_contact(),
+            Some(_) => settings.chosen_on_device().meets_on_device(),
+        };
         if model.meets_itself() && !takes_contact {
             chosen.choice.push_str("; a body that folds passes through itself");
         }
@@ -46,9 +49,11 @@ impl<S: Real> Backend<S> {
                 cpu("contact with tools, which no GPU is known to compute faster")
             }
             (DeviceRequest::Auto, _) if model.ties_bodies() => {
-                cpu("contact between bodies is computed on the CPU")
+                cpu("contact between bodies, which no GPU is known to compute faster")
             }
-            (device, _) if model.ties_bodies() => {
+            (device, _)
+                if model.ties_bodies() && !settings.chosen_on_device().meets_on_device() =>
+            {
                 Err(SimulationError::BodiesOnDevice { device: device.clone() })
             }
             (DeviceRequest::Auto, Method::Auto | Method::QuasiNewton) => {

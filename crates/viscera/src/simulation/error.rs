@@ -52,10 +52,11 @@ pub enum SimulationError {
         /// What it cannot do, and what it can.
         why: &'static str,
     },
-    /// A device was asked for in a scene with several bodies, which meet.
+    /// A device was asked for in a scene with several bodies, which meet, by a method that computes that on the CPU alone.
     #[error(
-        "`device = \"{device}\"`: contact between bodies is computed on the CPU; use `device = \"cpu\"` or `device = \"auto\"`, \
-         or let bodies pass through each other with `contact.bodies = false` and no ties"
+        "`device = \"{device}\"`: by this method, and in pages, contact between bodies is computed on the CPU; use \
+         `method = \"quasi_newton\"`, `device = \"cpu\"` or `device = \"auto\"`, or let bodies pass through each other with \
+         `contact.bodies = false` and no ties"
     )]
     BodiesOnDevice {
         /// What was asked for.

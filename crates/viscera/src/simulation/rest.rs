@@ -4,8 +4,9 @@ use super::{PatchForce, Simulation};
 use crate::rest::WayToRest;
 use crate::scalar::{Real, Vec3};
 use crate::scene::Scene;
-use crate::settings::Method;
+use crate::settings::{HAS_MEETINGS, Method};
 use crate::solver::balance::ForceBalance;
+use crate::state::ContactState;
 
 /// A run is at rest where it is less than this share of its displacement away. Half of a percent: an error of one percent must
 /// be warned of, one of a fifth of a percent must not.
@@ -184,8 +185,14 @@ impl<S: Real> Simulation<S> {
 
     /// Whether there are tools or ties, or tissue that presses on tissue.
     pub(super) fn has_contact(&self) -> bool {
-        let Self { scene, state, .. } = self;
-        !scene.tools.is_empty() || !scene.ties.is_empty() || !state.contact.pairs.is_empty()
+        let Self { scene, state, backend, .. } = self;
+        let is_any = |contact: &ContactState| !contact.pairs.is_empty();
+        // What tissue presses on stays on a device until it is asked for.
+        let is_there = HAS_MEETINGS && backend.device().is_some();
+        !scene.tools.is_empty()
+            || !scene.ties.is_empty()
+            || is_any(&state.contact)
+            || (is_there && is_any(&self.contact_of(state)))
     }
 
     /// How far the forces on patches are from those at rest, over the largest of those.

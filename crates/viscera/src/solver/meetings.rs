@@ -3,12 +3,60 @@
 use super::cpu::threads::Workers;
 use super::step::contacts::{ContactStep, OfVertices, Pairs, Places};
 use super::step::groups::Groups;
+use crate::contact::{Bond, Pair};
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::state::{ContactState, State};
+
+/// A sample of the skin and the triangle that it has met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundMeeting {
+    /// The sample's number.
+    pub sample: u32,
+    /// The triangle's number.
+    pub triangle: u32,
+    /// Barycentric weights of its point.
+    pub weights: [f64; 3],
+    /// From the triangle to the sample, of length 1.
+    pub normal: [f64; 3],
+    /// The way there [m].
+    pub away: [f64; 3],
+    /// Stiffness of contact [N/m], by how much both face each other, and what distances are longer by [m].
+    pub stiffness: f64,
+    /// See above.
+    pub shift: f64,
+}
+
+/// The pairs of contact among these, with vertices at `x` [m]; by samples.
+pub(crate) fn told<S: Real>(layout: &Layout<S>, all: &[Pair], x: &[Point<S>]) -> Vec<FoundMeeting> {
+    let Some(skin) = &layout.skin else { return Vec::new() };
+    let contact = all.iter().filter_map(|pair| match pair.bond {
+        Bond::Contact { foundation, shift, .. } => {
+            Some((pair, foundation.area * foundation.stiffness, shift))
+        }
+        Bond::Tie { .. } => None,
+    });
+    let mut found: Vec<FoundMeeting> = contact
+        .map(|(pair, stiffness, shift)| {
+            let sample = &skin.samples[pair.sample as usize];
+            let away = sample.place(x) - skin.place(pair.triangle, &pair.weights, x);
+            FoundMeeting {
+                sample: sample.number,
+                triangle: pair.triangle,
+                weights: pair.weights,
+                normal: pair.normal.to_array(),
+                away: away.to_array(),
+                stiffness,
+                shift,
+            }
+        })
+        .collect();
+    found.sort_unstable_by_key(|found| found.sample);
+    found
+}
 
 /// What a step does with pairs, and nothing else.
 pub struct Meetings<S> {
@@ -39,6 +87,11 @@ impl<S: Real> Meetings<S> {
             kept: ContactState { torn: vec![false; ties], ..ContactState::default() },
             layout,
         }
+    }
+
+    /// The pairs that were found last.
+    pub fn found(&self) -> Vec<FoundMeeting> {
+        told(&self.layout, self.pairs.all(), &self.points)
     }
 
     /// What a step of `dt` [s] does with pairs: finds them at its start, takes their forces and curvature there once, and keeps what

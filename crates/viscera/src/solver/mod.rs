@@ -46,7 +46,7 @@ pub(crate) use inputs::check_settings;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
 #[doc(hidden)]
-pub use meetings::Meetings;
+pub use meetings::{FoundMeeting, Meetings};
 use oscillations::Oscillations;
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};

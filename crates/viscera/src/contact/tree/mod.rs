@@ -147,6 +147,31 @@ impl Tree {
         self.leaf_of[sample as usize]
     }
 
+    /// Triangles in the order of leaves.
+    #[cfg(feature = "gpu")]
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// For a device: of each node the one behind all that are below it, its first triangle in the order of leaves and their
+    /// number, zero where it is no leaf, and its body or `u32::MAX`; then nodes by their height over the leaves.
+    #[cfg(feature = "gpu")]
+    pub fn rows(&self) -> (Vec<[u32; 4]>, Vec<Vec<u32>>) {
+        let mut heights = vec![0; self.nodes.len()];
+        let mut levels: Vec<Vec<u32>> = Vec::new();
+        for place in (0..self.nodes.len()).rev() {
+            let height = self.children(place).map_or(0, |[a, b]| 1 + heights[a].max(heights[b]));
+            heights[place] = height;
+            levels.resize(levels.len().max(height + 1), Vec::new());
+            levels[height].push(place as u32);
+        }
+        let row = |node: &Node| {
+            let count = if node.leaf == NONE { 0 } else { node.count };
+            [node.end, node.first, count, node.body]
+        };
+        (self.nodes.iter().map(row).collect(), levels)
+    }
+
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         let numbers = [&self.order, &self.leaves, &self.leaf_of, &self.samples, &self.first_sample];

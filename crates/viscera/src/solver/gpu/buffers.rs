@@ -14,7 +14,6 @@ use crate::scalar::lanes::LANES;
 use crate::settings::{Acceleration, Method, SolverSettings};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
 use crate::solver::quasi_newton::progress::PartProgress;
-use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device::Extent;
 
 /// All buffers of a solver.
@@ -96,7 +95,7 @@ impl Buffers {
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
         let copies = when(layout.is_split(), 16 * layout.copy_count() as u64);
         let lanes = LANES as u64;
-        let contact = Samples::known(on_device.samples).map_or(0, Samples::vectors);
+        let contact = on_device.vectors();
         let own = [
             (Slot::Copies, "copies of vertices", copies),
             (Slot::Loads, "loads", 16 * (on_device.slot_count() + contact)),

@@ -6,10 +6,14 @@ use super::error::GpuError;
 use super::reading::read;
 use super::slots::Slot;
 use super::solver::GpuSolver;
-use crate::contact::{Tool, Wrench, beyond_devices};
+use crate::contact::{Sample, Tool, Wrench, beyond_devices};
+use crate::layout::Layout;
 use crate::model::Model;
+use crate::scalar::lanes::Point;
 use crate::scalar::vec3;
 use crate::solver::error::StepError;
+use crate::solver::meetings::{FoundMeeting, told};
+use crate::solver::step::contacts::meetings::{self, Meetings};
 use crate::solver::step::contacts::on_device::{
     DeviceTools, GRID_ROW, IS_THERE, Samples, SentTools, ToolRecords,
 };
@@ -18,6 +22,9 @@ use crate::state::{ContactState, State};
 /// Of tools of closed surfaces that are too large for the cells of their grid.
 const TOO_FINE: &str =
     "distances of the tools' surfaces do not fit; use a thicker contact, whose cells are larger";
+
+/// Of bodies that meet each other, by other methods and in builds that leave it out.
+const BODIES_ON_DEVICE: &str = "only the quasi-Newton method computes how bodies meet, and not in pages; use `method = \"quasi_newton\"`";
 
 /// Why a device cannot compute contact with these tools.
 fn refuses(tools: &[Tool]) -> Option<&'static str> {
@@ -67,6 +74,14 @@ impl GpuSolver {
         })
     }
 
+    /// Bodies meet each other where that is computed.
+    pub(super) fn check_bodies(&self, model: &Model<f32>) -> Result<(), StepError> {
+        match model.ties_bodies() && self.meetings().is_none() {
+            true => Err(StepError::ContactOnDevice { why: BODIES_ON_DEVICE }),
+            false => Ok(()),
+        }
+    }
+
     /// Sends the tools of a step of `dt` [s].
     pub(super) fn send_tools(&mut self, tools: &[Tool], dt: f64) -> Result<(), StepError> {
         if self.samples().is_none() {
@@ -105,7 +120,50 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Waits for the device and reads what is kept of contact with tools from step to step.
+    /// What meets tissue, where that is computed: known to be none where no kernels are.
+    #[inline]
+    pub(super) fn meetings(&self) -> Option<Meetings> {
+        Meetings::known(self.meetings)
+    }
+
+    /// Bytes that are read of ties, where there are any.
+    pub(super) fn of_ties(&self) -> Option<u64> {
+        self.meetings().map(|all| 16 * u64::from(all.ties)).filter(|bytes| *bytes > 0)
+    }
+
+    /// Puts what a state has kept of tissue that meets tissue onto the device.
+    pub(super) fn put_meetings(&self, layout: &Layout<f32>, contact: &ContactState) {
+        if self.meetings().is_none() {
+            return;
+        }
+        let put = |slot, rows: Vec<[f32; 4]>| {
+            self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&rows));
+        };
+        put(Slot::Meetings, meetings::rows(layout, &contact.pairs));
+        put(Slot::Torn, meetings::torn_rows(layout, &contact.torn));
+    }
+
+    /// Waits for the device and reads what samples of tissue have met in the last step, which has begun at a state.
+    pub fn found(
+        &self,
+        model: &Model<f32>,
+        start: &State<f32>,
+    ) -> Result<Vec<FoundMeeting>, GpuError> {
+        let layout = self.layout_of(model)?;
+        let mut found = Vec::new();
+        if self.meetings().is_some() {
+            let order = layout.numbering.order.iter();
+            let x: Vec<Point<f32>> =
+                order.map(|&v| Point::new(start.positions[v as usize], 0.0)).collect();
+            read(&self.device, &[self.whole(Slot::Meetings)], |read| {
+                let all = meetings::pairs(&layout, bytemuck::cast_slice(read[0]));
+                found = told(&layout, &all, &x);
+            })?;
+        }
+        Ok(found)
+    }
+
+    /// Waits for the device and reads what is kept of contact from step to step.
     pub fn contact(
         &self,
         model: &Model<f32>,
@@ -117,6 +175,10 @@ impl GpuSolver {
         let layout = self.layout_of(model)?;
         let poses = self.tools.all.poses().to_vec();
         let mut contact = ContactState { poses, ..ContactState::default() };
+        // In the order of the model's parts, of which several may be one here.
+        let part = |samples: &[Sample], number: u32| {
+            samples.get(number as usize).map(|sample| model.part_of(sample.vertices[0]))
+        };
         if self.samples().is_some() {
             let user = |v: usize| layout.numbering.order[v] as usize;
             let place =
@@ -125,6 +187,17 @@ impl GpuSolver {
                 contact.touches =
                     DeviceTools::touches(&layout, bytemuck::cast_slice(read[0]), place);
             })?;
+            let all = &mut contact.touches;
+            all.sort_by_key(|at| (part(&model.samples, at.sample), at.sample, at.tool));
+        }
+        if self.meetings().is_some() {
+            let ranges = [self.whole(Slot::Meetings), self.whole(Slot::Torn)];
+            read(&self.device, &ranges, |read| {
+                contact.pairs = meetings::kept(&layout, bytemuck::cast_slice(read[0]));
+                meetings::torn(&layout, bytemuck::cast_slice(read[1]), &mut contact.torn);
+            })?;
+            let all = &mut contact.pairs;
+            all.sort_by_key(|kept| (part(&model.skin.samples, kept.sample), kept.sample));
         }
         Ok(contact)
     }

@@ -16,8 +16,8 @@ use crate::settings::Method;
 use crate::solver::inputs::{Inputs, check_inputs, check_state};
 use crate::solver::report::FrameReading;
 use crate::solver::step::balance::ForceBalance;
-use crate::solver::step::contacts::Contacts;
 use crate::solver::step::contacts::on_device::{DeviceTools, IS_THERE};
+use crate::solver::step::contacts::{Contacts, Pairs, meetings};
 use crate::solver::step::data::EndOfStep;
 use crate::solver::step::predict::load_tethers;
 use crate::solver::step::recovered::MeasuredTets;
@@ -110,6 +110,7 @@ impl GpuSolver {
         if reading >= FrameReading::State {
             let points = self.buffers.points_size;
             ranges.extend([Slot::Unknowns, Slot::Velocities].map(|slot| part(slot, points)));
+            ranges.extend(self.of_ties().map(|bytes| part(Slot::Torn, bytes)));
         }
         if reading == FrameReading::Balance {
             ranges.extend(self.balance_slots().into_iter().map(|slot| self.whole(slot)));
@@ -128,7 +129,8 @@ impl GpuSolver {
 
     /// Takes over what moves, where it is among copies of those ranges.
     pub(super) fn take_moves(&self, layout: &Layout<f32>, state: &mut State<f32>, read: &[&[u8]]) {
-        let [_, _, positions, velocities, ..] = read else { return };
+        let [_, _, positions, velocities, more @ ..] = read else { return };
+        let (torn, balance) = more.split_at(more.len().min(self.of_ties().iter().count()));
         put_in_user_order(layout, bytemuck::cast_slice(positions), &mut state.positions);
         put_in_user_order(layout, bytemuck::cast_slice(velocities), &mut state.velocities);
         state.multiplier_dt = self.multiplier_dt;
@@ -137,12 +139,18 @@ impl GpuSolver {
             state.contact.poses.clear();
             state.contact.poses.extend_from_slice(self.tools.all.poses());
             state.contact.touches.clear();
-            if IS_THERE && let Some(rows) = read.get(4 + BEFORE_CONTACT) {
+            if IS_THERE && let Some(rows) = balance.get(BEFORE_CONTACT) {
                 let user = |v: usize| layout.numbering.order[v] as usize;
                 let place = |v: usize| state.positions[user(v)];
                 let touches = DeviceTools::touches(layout, bytemuck::cast_slice(rows), place);
                 state.contact.touches = touches;
             }
+        }
+        if let [torn] = torn {
+            meetings::torn(layout, bytemuck::cast_slice(torn), &mut state.contact.torn);
+        }
+        if self.meetings().is_some() {
+            state.contact.pairs.clear();
         }
     }
 
@@ -200,6 +208,9 @@ impl GpuSolver {
         let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
         if self.samples().is_some() {
             slots.push(Slot::Contact);
+        }
+        if self.meetings().is_some() {
+            slots.push(Slot::Meetings);
         }
         if self.layout.is_viscous() {
             slots.push(match self.settings.method {
@@ -293,8 +304,12 @@ impl GpuSolver {
             Some(_) => more.next().map(|rows| bytemuck::cast_slice(rows)),
             None => None,
         };
-        let contacts =
+        let mut contacts =
             contacts.map_or_else(Contacts::default, |rows| self.tools.all.contacts(model, rows));
+        if let Some(rows) = self.meetings().and_then(|_| more.next()) {
+            contacts.pairs =
+                Pairs::found(model, meetings::pairs(model, bytemuck::cast_slice(rows)));
+        }
         if let Some(rows) = more.next() {
             self.put_strains(model, state, rows, &mut measured);
         }

@@ -1,7 +1,6 @@
 //! The kernels: which text each is made of, and what it is bound to.
 
-use super::bindings::{storage_entry, uniform_layout};
-use super::device::{Device, Pipeline};
+use super::meetings;
 use super::shown::SHOWS_VALUES;
 use super::slots::Slot;
 use crate::elements::TetForm;
@@ -67,6 +66,9 @@ pub enum File {
     EndContacts,
     Values,
     Pressures,
+    Skin,
+    SortMeetings,
+    EndMeetings,
 }
 
 /// Choices that the text of a file depends on, beside the kernel.
@@ -232,6 +234,13 @@ kernels! {
     MEASURE_TETS = Values "measure_tets" 64 [Tets Table FramePoints Measured];
     AVERAGE_TETS = Values "average_tets" 64 [Tets FramePoints Measured Around];
     MEASURE_PRESSURES = Pressures "measure_pressures" 64 [Loads Table FramePoints Measured];
+    PLACE_SKIN = Skin "place_skin" 64 [Points Loads Table];
+    TURN_SKIN = Skin "turn_skin" 64 [Loads Table];
+    BOX_SKIN = Skin "box_skin" 64 [Loads Table];
+    PREPARE_SKIN = Skin "prepare_skin" 256 [Points Loads VertexData Table];
+    FIND_MEETINGS = Skin "find_meetings" 64 [Points Loads Control VertexData Table];
+    SORT_MEETINGS = SortMeetings "sort_meetings" 128 [Loads Table];
+    END_MEETINGS = EndMeetings "end_meetings" 64 [Points Loads Table];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
@@ -338,7 +347,6 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
 
 /// The files of kernels that builds without `gpu-solves` leave out.
 fn files_of_solves(file: File) -> Vec<&'static str> {
-    let own = |file| vec![file];
     let levels = kernel_text!("../quasi_newton/preconditioner/levels.wgsl");
     let solve = |own: Vec<&'static str>| {
         [laws(), pieces(), vec![kernel_text!("../quasi_newton/progress.wgsl")], own].concat()
@@ -349,7 +357,10 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
     let samples = kernel_text!("../step/contacts/solve.wgsl");
     let samples_end = kernel_text!("../step/contacts/solve_end.wgsl");
     match file {
-        File::Begin => solve(own(kernel_text!("../quasi_newton/begin.wgsl"))),
+        File::Begin => {
+            let own = kernel_text!("../quasi_newton/begin.wgsl");
+            solve([meetings::IN_BEGIN, &[own]].concat())
+        }
         File::Refresh => {
             let own = kernel_text!("../quasi_newton/preconditioner/refresh.wgsl");
             [laws(), vec![levels, own]].concat()
@@ -358,39 +369,33 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
             vec![levels, kernel_text!("../quasi_newton/preconditioner/invert.wgsl")]
         }
         File::EvaluateTrial => {
-            let own = [PLAIN, none, TOOLS, samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
-            solve(own.to_vec())
+            let own = [samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
+            solve([&[PLAIN, none, TOOLS], meetings::IN_TRIAL, &own].concat())
         }
         File::EvaluateRecovered => {
-            let own = [
-                forces,
-                kernel_text!("../quasi_newton/recovered.wgsl"),
-                TOOLS,
-                samples,
-                kernel_text!("../quasi_newton/evaluate.wgsl"),
-            ];
-            solve([tables.to_vec(), own.to_vec()].concat())
+            let first = [forces, kernel_text!("../quasi_newton/recovered.wgsl"), TOOLS];
+            let own = [samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
+            solve([&tables, &first[..], meetings::IN_TRIAL, &own].concat())
         }
         File::Apply => vec![levels, kernel_text!("../quasi_newton/preconditioner/apply.wgsl")],
         File::Direction => solve(vec![levels, kernel_text!("../quasi_newton/direction.wgsl")]),
         File::End => {
-            let own = [PLAIN, none, TOOLS, samples_end, kernel_text!("../quasi_newton/end.wgsl")];
-            solve(own.to_vec())
+            let own = [samples_end, kernel_text!("../quasi_newton/end.wgsl")];
+            solve([&[PLAIN, none, TOOLS], meetings::IN_END, &own].concat())
         }
         File::EndRecovered => {
-            let own = [
-                kernel_text!("../quasi_newton/recovered_end.wgsl"),
-                TOOLS,
-                samples_end,
-                kernel_text!("../quasi_newton/end.wgsl"),
-            ];
-            solve([tables.to_vec(), own.to_vec()].concat())
+            let first = [kernel_text!("../quasi_newton/recovered_end.wgsl"), TOOLS];
+            let own = [samples_end, kernel_text!("../quasi_newton/end.wgsl")];
+            solve([&tables, &first[..], meetings::IN_END, &own].concat())
         }
         File::FindContacts => vec![TOOLS, kernel_text!("../step/contacts/find.wgsl")],
         File::LoadContacts => SAMPLES.to_vec(),
         File::EndContacts => {
             [pieces(), vec![TOOLS, kernel_text!("../step/contacts/end.wgsl")]].concat()
         }
+        File::Skin => [&[TOOLS], meetings::FIND].concat(),
+        File::SortMeetings => meetings::SORT.to_vec(),
+        File::EndMeetings => [&[TOOLS], meetings::END].concat(),
         File::Pressures if SHOWS_VALUES => vec![TOOLS, kernel_text!("pressures.wgsl")],
         // Of the explicit method.
         _ => small_steps(file, &pieces(), &[&tables[..], &[forces]].concat()),
@@ -446,7 +451,7 @@ pub fn texts() -> Vec<(String, String)> {
 }
 
 /// The key of a pipeline.
-fn key(kernel: &Kernel, variant: Variant) -> String {
+pub(super) fn key(kernel: &Kernel, variant: Variant) -> String {
     if varies(kernel) {
         format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
     } else if matches!(
@@ -476,44 +481,4 @@ fn varies(kernel: &Kernel) -> bool {
             | File::Loads
             | File::HistoryTets
     )
-}
-
-/// Compiles a kernel, or finds it compiled.
-pub(super) fn pipeline(device: &Device, kernel: &Kernel, variant: Variant) -> Pipeline {
-    let key = key(kernel, variant);
-    let mut known = device.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if let Some(pipeline) = known.get(&key) {
-        return pipeline.clone();
-    }
-    let made = compile(device, kernel, variant, &key);
-    known.insert(key, made.clone());
-    made
-}
-
-fn compile(device: &Device, kernel: &Kernel, variant: Variant, label: &str) -> Pipeline {
-    let wgpu = &device.device;
-    let module = wgpu.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(source(kernel, variant).into()),
-    });
-    let entries: Vec<_> = kernel.slots.iter().map(|&slot| storage_entry(slot)).collect();
-    let storage = wgpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some(label),
-        entries: &entries,
-    });
-    let uniforms = uniform_layout(wgpu);
-    let layout = wgpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &[Some(&storage), Some(&uniforms)],
-        immediate_size: 0,
-    });
-    let pipeline = wgpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        module: &module,
-        entry_point: Some(kernel.entry),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    });
-    Pipeline { pipeline, storage }
 }

@@ -14,6 +14,7 @@ use crate::layout::Layout;
 use crate::material::MaterialConstants;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
+use crate::solver::step::contacts::meetings::Meetings;
 use crate::solver::step::contacts::on_device as on_device_contact;
 use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device;
@@ -82,6 +83,9 @@ pub(super) struct Header {
     pub sample_entries: u32,
     pub contact: u32,
     pub tool_sums: u32,
+    /// Of tissue that meets tissue: where its row stands, and the number of the first sample or tie among elements.
+    pub skin: u32,
+    pub first_meeting: u32,
 }
 
 /// The ranges of the vertex data, in order, with the slot that kernels know them by; `None` for one that only the
@@ -154,7 +158,7 @@ pub(super) struct DeviceLayout {
     /// Place of the load of each corner, per block and corner.
     corners: Vec<[[u32; LANES]; 4]>,
     /// Sorted by colour.
-    elements: Vec<Element>,
+    pub elements: Vec<Element>,
     /// Numbers of elements, tetrahedra first, part by part.
     members: Vec<u32>,
     /// First those of elements.
@@ -164,6 +168,8 @@ pub(super) struct DeviceLayout {
     pub parts: Parts,
     /// Of the surface, for the methods that compute contact.
     pub samples: Option<Samples>,
+    /// Of tissue that meets tissue.
+    pub meetings: Option<Meetings>,
 }
 
 impl DeviceLayout {
@@ -228,11 +234,12 @@ impl DeviceLayout {
             }
         }
         let samples = Samples::new(layout);
-        let with_samples = Samples::known(samples).is_some();
-        let (members, pieces) = pieces(layout, &elements, &by_kind, with_samples);
+        let meetings = Meetings::new(layout, settings);
+        let with = [Samples::known(samples).is_some(), Meetings::known(meetings).is_some()];
+        let (members, pieces) = pieces(layout, &elements, &by_kind, with);
         let parts = Parts::new(layout, settings, &pieces);
         let block_parts = block_parts(layout);
-        Self { offsets, corners, elements, members, pieces, block_parts, parts, samples }
+        Self { offsets, corners, elements, members, pieces, block_parts, parts, samples, meetings }
     }
 
     /// Where a vertex's loads begin.
@@ -280,6 +287,7 @@ impl DeviceLayout {
             law_ends: law_ends(layout),
             part_count: layout.part_count() as u32,
             first_sample: u32::MAX,
+            first_meeting: u32::MAX,
             ..Header::default()
         };
         // Room only: the host writes these at the start of a step, weights when its length changes. Offsets of
@@ -308,6 +316,10 @@ impl DeviceLayout {
             let tables = on_device_contact::tables(layout).map(|table| add(None, &words(&table)));
             [header.samples, header.sample_offsets, header.sample_entries] = tables;
         }
+        if let Some(skin) = layout.skin.as_ref().zip(Meetings::known(self.meetings)) {
+            header.skin = self.place_meetings(skin, &mut add);
+        }
+        self.place_ranges(&mut header, &mut ranges);
         let [start, size] = vertex_data(layout, settings, &mut ranges);
         (header.stride, header.anchors) = (Self::stride(layout), (start / 16) as u32);
 

@@ -66,12 +66,13 @@ pub(super) fn block_parts(layout: &Layout<f32>) -> Vec<u32> {
     sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
 }
 
-/// Elements of each part in pieces, `with_samples` of the surface behind them, then vertices.
+/// Elements of each part in pieces, behind them samples of the surface and what meets other tissue where there `are` any; then
+/// vertices.
 pub(super) fn pieces(
     layout: &Layout<f32>,
     others: &[Element],
     by_kind: &[usize],
-    with_samples: bool,
+    are: [bool; 2],
 ) -> (Vec<u32>, Vec<Piece>) {
     let mut elements = Vec::new();
     let mut first = 0;
@@ -87,9 +88,15 @@ pub(super) fn pieces(
     let first = (LANES * first) as u32;
     elements.extend(by_kind.iter().map(|&i| (others[i].part, first + i as u32)));
     // Behind all of them samples of the surface.
-    let samples = layout.samples.iter().filter(|_| with_samples);
+    let samples = layout.samples.iter().filter(|_| are[0]).map(|sample| sample.part);
+    let skin = layout.skin.as_ref().filter(|_| are[1]);
+    let meetings = skin.into_iter().flat_map(|skin| {
+        let part = |place: usize| skin.samples[place].part;
+        let tied = skin.ties.iter().map(|(place, _)| *place as usize);
+        (0..skin.samples.len()).chain(tied).map(part)
+    });
     let first = first + others.len() as u32;
-    elements.extend(samples.zip(first..).map(|(sample, number)| (sample.part, number)));
+    elements.extend(samples.chain(meetings).zip(first..));
     // A part's elements keep the order of a model of their own.
     let part = |i: u32| elements[i as usize].0;
     let order = sorting::by_key(0..elements.len() as u32, |i| [u64::from(part(i)), 0]);

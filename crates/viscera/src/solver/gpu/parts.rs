@@ -66,7 +66,11 @@ impl SmallSteps {
     }
 }
 
-/// Whether nothing holds a part in a step, and its mean acceleration [m/s^2] then.
+/// All bodies of a part are free, or some of several are that are one part on devices.
+pub(super) const WHOLLY_FREE: u32 = 1;
+const PARTLY_FREE: u32 = 2;
+
+/// Whether nothing holds a part in a step, zero where something does, and its mean acceleration [m/s^2] then.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Fall {
@@ -79,6 +83,8 @@ pub(super) struct Fall {
 pub(super) struct Falls {
     /// Of each part [kg], and whether anchors hold it.
     bodies: Vec<(f64, bool)>,
+    /// Which parts of the model nothing holds, where several are one part.
+    free: Vec<bool>,
     /// Forces on each part [N].
     forces: Vec<Vec3<f64>>,
     /// In this step.
@@ -94,7 +100,8 @@ impl Falls {
         let bodies: Vec<_> = layout.parts.iter().map(body).collect();
         let count = bodies.len();
         let all = vec![Fall::default(); count];
-        Self { bodies, forces: vec![Vec3::ZERO; count], all, before: Vec::new() }
+        let free = Vec::new();
+        Self { bodies, free, forces: vec![Vec3::ZERO; count], all, before: Vec::new() }
     }
 
     /// Finds what nothing holds among what acts on vertices; whether that is news to the device.
@@ -113,6 +120,7 @@ impl Falls {
             }
             self.forces[part] += vec3(x, y, z).cast::<f64>();
         }
+        self.mark_partly_free(layout, updates);
         for ((fall, (mass, _)), force) in self.all.iter_mut().zip(&self.bodies).zip(&self.forces) {
             let acceleration = gravity + (*force * (1.0 / mass)).cast();
             fall.acceleration = acceleration.to_array();
@@ -121,6 +129,22 @@ impl Falls {
             bytemuck::cast_slice::<Fall, u8>(&self.before) != bytemuck::cast_slice(&self.all);
         self.before.clone_from(&self.all);
         is_news
+    }
+}
+
+impl Falls {
+    /// Parts of several bodies of which something holds some.
+    fn mark_partly_free(&mut self, layout: &Layout<f32>, updates: &[Update]) {
+        let Some(joined) = layout.joined() else { return };
+        self.free.clear();
+        self.free.extend(joined.anchored.iter().map(|is_anchored| !is_anchored));
+        for update in updates.iter().filter(|at| at.is_pinned != 0 || at.stiffness != 0.0) {
+            self.free[joined.of_vertices[update.vertex as usize] as usize] = false;
+        }
+        for (&part, _) in joined.of_parts.iter().zip(&self.free).filter(|(_, is_free)| **is_free) {
+            let is_free = &mut self.all[part as usize].is_free;
+            *is_free = if *is_free == 0 { PARTLY_FREE } else { *is_free };
+        }
     }
 }
 

@@ -11,6 +11,7 @@ use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
 use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::step::contacts::meetings::Meetings;
 use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device::Extent;
 use crate::solver::xpbd::is_jacobi;
@@ -57,6 +58,8 @@ pub struct Recorder<'a> {
     pub recovered: Option<Extent>,
     /// Of the surface, where this method computes contact.
     pub samples: Option<Samples>,
+    /// Of tissue that meets tissue, where this method computes that.
+    pub meetings: Option<Meetings>,
 }
 
 impl<'a> Recorder<'a> {
@@ -87,6 +90,7 @@ impl<'a> Recorder<'a> {
             levels,
             recovered: Extent::new(layout),
             samples,
+            meetings: Meetings::new(layout, settings),
         }
     }
 

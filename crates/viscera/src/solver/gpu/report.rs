@@ -38,7 +38,13 @@ impl GpuSolver {
         if !reports || self.multiplier_dt == 0.0 {
             return Ok(Vec::new());
         }
-        Ok(self.part_records()?.iter().map(|part| part.guard.report()).collect())
+        let of_layout = self.part_records()?;
+        let of_layout: Vec<_> = of_layout.iter().map(|part| part.guard.report()).collect();
+        // Parts that may touch are judged as one.
+        Ok(match self.layout.joined() {
+            Some(joined) => joined.of_parts.iter().map(|&part| of_layout[part as usize]).collect(),
+            None => of_layout,
+        })
     }
 
     /// Passes of the last solve of the quasi-Newton method that each connected part had no use for, because its next step was

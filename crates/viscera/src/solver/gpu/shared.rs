@@ -13,6 +13,7 @@ use crate::solver::cpu::products::LARGEST_WINDOW;
 use crate::solver::quasi_newton::on_device::IS_THERE;
 use crate::solver::quasi_newton::progress::{PartProgress, SolveState};
 use crate::solver::quasi_newton::tables;
+use crate::solver::step::contacts::meetings;
 use crate::solver::step::contacts::on_device as contact;
 use crate::solver::step::control::PartGuard;
 use crate::solver::step::modes::MODES;
@@ -88,7 +89,10 @@ pub(super) fn constants() -> String {
     // Of kernels that builds without `gpu-solves` leave out.
     let of_solves = IS_THERE
         .then(|| tables::words().into_iter().chain(on_device::names()).chain(contact::names()));
-    let ranges = layout::vertex_ranges().chain(of_solves.into_iter().flatten());
+    let of_meetings = meetings::IS_THERE.then(meetings::names);
+    let ranges = layout::vertex_ranges()
+        .chain(of_solves.into_iter().flatten())
+        .chain(of_meetings.into_iter().flatten());
     let numbers = words::words().into_iter().chain(MODES.iter().copied());
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =

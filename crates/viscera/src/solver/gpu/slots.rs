@@ -51,6 +51,8 @@ pub enum Slot {
     FramePoints,
     Measured,
     Around,
+    Meetings,
+    Torn,
 }
 
 impl Slot {

@@ -10,6 +10,7 @@ use super::layout::DeviceLayout;
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
 use super::outgoing::{Outgoing, Ready};
 use super::parts::{Falls, SmallSteps};
+use super::pipelines::pipeline;
 use super::reading::Sent;
 use super::record::{Dispatch, Recorder};
 use super::ring::Frames;
@@ -31,6 +32,7 @@ use crate::solver::inputs::{check_model, check_settings};
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
+use crate::solver::step::contacts::meetings::Meetings;
 use crate::solver::step::contacts::on_device::{ALL_SUMS, Samples};
 use crate::solver::step::recovered;
 use crate::solver::step::tethers::Bundle;
@@ -46,6 +48,8 @@ pub struct GpuSolver {
     pub(super) tools: OfTools,
     /// Of the surface, where contact is computed.
     pub(super) samples: Option<Samples>,
+    /// Of tissue that meets tissue, where that is computed.
+    pub(super) meetings: Option<Meetings>,
     /// The model as it lies on the device.
     pub(super) layout: Arc<Layout<f32>>,
     pub(super) ready: [Vec<Ready>; 3],
@@ -67,7 +71,7 @@ pub struct GpuSolver {
     pub(super) updates_sent: Vec<Update>,
     /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
     pub(super) update_of: Vec<u32>,
-    /// Connected parts of the model.
+    /// Connected parts of the layout.
     pub(super) part_count: usize,
     /// The step [s] that the norm's weights on the device belong to.
     pub(super) weights_dt: f64,
@@ -134,14 +138,14 @@ impl GpuSolver {
         settings: &SolverSettings,
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
-        let laid = Arc::new(Layout::new(model, settings));
+        let laid = Arc::new(Layout::on_device(model, settings));
         let plan = Plan::on_device(&laid, settings);
         let layout = DeviceLayout::new(&laid, settings);
         let (levels, table) = DeviceLevels::new(&laid, settings).unzip();
         let of_levels = levels.as_ref();
         let buffers = Buffers::new(device, &laid, settings, &layout, of_levels, left_over)?;
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
-        let samples = layout.samples;
+        let (samples, meetings) = (layout.samples, layout.meetings);
         let recorder = Recorder::new(&laid, settings, vector, layout.pieces(), of_levels, samples);
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
@@ -159,6 +163,7 @@ impl GpuSolver {
         });
         uniforms.put_jobs(device, next, &shown::jobs(&laid));
         let is_explicit = settings.method == Method::Explicit;
+        let small_steps = if is_explicit { laid.part_count() } else { 0 };
         let mut solver = Self {
             outgoing: Outgoing::new(device),
             frames: Frames::new(buffers.points_size),
@@ -172,6 +177,7 @@ impl GpuSolver {
             uniforms,
             tools: OfTools::default(),
             samples,
+            meetings,
             layout: Arc::clone(&laid),
             ready: [prologue, body, epilogue],
             stages: record.stages,
@@ -179,7 +185,7 @@ impl GpuSolver {
             restart,
             multiplier_dt: 0.0,
             touched: Vec::new(),
-            part_count: model.part_count(),
+            part_count: laid.part_count(),
             updates: Vec::new(),
             updates_before: Vec::new(),
             updates_sent: Vec::new(),
@@ -187,10 +193,7 @@ impl GpuSolver {
             has_moved_anchors: true,
             stability: is_explicit.then(|| Stability::for_a_device(&laid, settings)),
             tethers: Vec::new(),
-            small_steps: vec![
-                SmallSteps::default();
-                if is_explicit { model.part_count() } else { 0 }
-            ],
+            small_steps: vec![SmallSteps::default(); small_steps],
             buffers,
             levels,
             passes: 0,
@@ -240,7 +243,7 @@ impl GpuSolver {
     /// the other, an iteration is.
     pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
         let settings = &settings.chosen_on_device();
-        let record = Recorded::new(&Layout::new(model, settings), settings).record;
+        let record = Recorded::new(&Layout::on_device(model, settings), settings).record;
         [record.prologue, record.body, record.epilogue].map(|list| list.len())
     }
 
@@ -314,6 +317,7 @@ impl GpuSolver {
         self.forget_pairs();
         let into = self.samples().map(|_| (&self.buffers, &self.device.queue));
         self.tools.put(into, layout, &state.contact);
+        self.put_meetings(layout, &state.contact);
     }
 
     /// Solves begin without what they have learned.
@@ -397,7 +401,7 @@ fn in_solver_order(layout: &Layout<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> 
 }
 
 fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) -> Ready {
-    let made = kernels::pipeline(device, dispatch.kernel, dispatch.variant);
+    let made = pipeline(device, dispatch.kernel, dispatch.variant);
     let entries: Vec<_> = (dispatch.kernel.slots.iter().zip(dispatch.places()))
         .map(|(&slot, place)| wgpu::BindGroupEntry {
             binding: slot as u32,

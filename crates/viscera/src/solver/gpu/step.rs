@@ -119,6 +119,7 @@ impl GpuSolver {
         dt: f64,
     ) -> Result<u32, StepError> {
         let layout = self.layout_of(model)?;
+        self.check_bodies(model)?;
         let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
         self.send_tools(&inputs.tools, dt)?;

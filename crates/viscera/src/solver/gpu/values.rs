@@ -7,6 +7,7 @@ use wgpu::BufferUsages;
 
 use super::kernels::{self, Kernel, Swept, Variant};
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
+use super::pipelines::pipeline;
 use super::shown::{JOBS, SHOWS_VALUES, TissueValue, jobs};
 use super::slots::{Place, Slot};
 use super::solver::GpuSolver;
@@ -57,7 +58,7 @@ impl GpuSolver {
         });
         for &(kernel, job) in list {
             let variant = Variant { form: TetForm::GreenStrain, swept: Swept::Vertices };
-            let made = kernels::pipeline(&self.device, kernel, variant);
+            let made = pipeline(&self.device, kernel, variant);
             let entries: Vec<_> = kernel
                 .slots
                 .iter()

@@ -2,18 +2,20 @@
 
 use super::clusters::ClusterRow;
 use super::layout::{Header, Material};
-use super::parts::{Fall, PartRow, Piece, SmallSteps};
+use super::parts::{Fall, PartRow, Piece, SmallSteps, WHOLLY_FREE};
 use super::slots::Element;
 use crate::layout::HAS_CLUSTERS;
+use crate::solver::step::contacts::meetings::{self, SkinRow};
 use crate::solver::step::contacts::on_device::IS_THERE;
+
+macro_rules! words {
+    ($record:ty { $($name:literal $field:ident)* }) => {
+        vec![$(($name, (std::mem::offset_of!($record, $field) / 4) as u32)),*]
+    };
+}
 
 /// Names and places of words that kernels find in the table.
 pub(super) fn words() -> Vec<(&'static str, u32)> {
-    macro_rules! words {
-        ($record:ty { $($name:literal $field:ident)* }) => {
-            vec![$(($name, (std::mem::offset_of!($record, $field) / 4) as u32)),*]
-        };
-    }
     let mut all = words!(Header {
         "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "ELEMENTS_AT" elements
         "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
@@ -42,6 +44,8 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
             "SAMPLE_ENTRIES_AT" sample_entries "CONTACT_AT" contact "TOOL_SUMS_AT" tool_sums
         }));
     }
+    all.push(("FIRST_MEETING_AT", (std::mem::offset_of!(Header, first_meeting) / 4) as u32));
+    all.extend(meetings::IS_THERE.then(skin_words).into_iter().flatten());
     all.extend(words!(Piece {
         "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
     }));
@@ -66,6 +70,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     }));
     all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
     all.extend([
+        ("WHOLLY_FREE", WHOLLY_FREE),
         ("FALL_WORDS", size(size_of::<Fall>())),
         ("SMALL_WORDS", size(size_of::<SmallSteps>())),
         ("PIECE_WORDS", size(size_of::<Piece>())),
@@ -73,5 +78,27 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         ("ELEMENT_WORDS", size(size_of::<Element>())),
         ("MATERIAL_WORDS", size(size_of::<Material>())),
     ]);
+    all
+}
+
+/// Of tissue that meets tissue.
+fn skin_words() -> Vec<(&'static str, u32)> {
+    let mut all = words!(Header { "SKIN_AT" skin });
+    all.extend(words!(SkinRow {
+        "SKIN_SAMPLES" samples "SKIN_TIES" ties "SKIN_POINTS" points "SKIN_TRIANGLES" triangles
+        "SKIN_NODES" nodes "SKIN_ORDER" order "SKIN_LEVEL_OFFSETS" level_offsets
+        "SKIN_LEVEL_NODES" level_nodes "SKIN_AROUND_OFFSETS" around_offsets
+        "SKIN_AROUND" around "SKIN_NEIGHBOUR_OFFSETS" neighbour_offsets
+        "SKIN_NEIGHBOURS" neighbours "SKIN_OWN_OFFSETS" own_offsets
+        "SKIN_OWN_ENTRIES" own_entries "SKIN_REACTION_OFFSETS" reaction_offsets
+        "SKIN_REACTION_ENTRIES" reaction_entries "SKIN_SHIFTS" shifts
+        "SKIN_SHIFT_COUNT" shift_count "SKIN_SAMPLE_COUNT" sample_count
+        "SKIN_NODE_COUNT" node_count "SKIN_MEETINGS" meetings "SKIN_POINTS_NOW" points_now
+        "SKIN_TRIANGLES_NOW" triangles_now "SKIN_NODES_NOW" nodes_now "SKIN_SORTED" sorted
+        "SKIN_SORTED_TOO" sorted_too "SKIN_TORN" torn "SKIN_REACH" reach
+        "SKIN_ITSELF" itself "SKIN_BODIES" bodies "SKIN_THICKNESS" thickness
+        "SKIN_STIFFNESS" stiffness "SKIN_FRICTION" friction "SKIN_DEPTH_OWN" depth_own
+        "SKIN_DEPTH_OTHER" depth_other
+    }));
     all
 }

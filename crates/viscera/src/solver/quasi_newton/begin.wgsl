@@ -19,8 +19,9 @@ fn inertial(v: u32, start: vec3f, velocity: vec3f) -> vec3f {
     return place + (frame.gravity + (on_vertex.xyz + pull) * (1.0 / mass)) * squared;
 }
 
-// Whether nothing holds a part, but for tools, and whether a tool presses on it where the step begins.
-fn is_free(part: u32) -> bool {
+// Whether nothing holds a body of a part, but for tools and other tissue, and whether one of these presses on the part where the
+// step begins.
+fn has_free_body(part: u32) -> bool {
     return table[table[FALLS_AT] + FALL_WORDS * part + FALL_IS_FREE] != 0u;
 }
 
@@ -31,22 +32,18 @@ fn is_pressed(part: u32) -> bool {
 // How what nothing holds is accelerated; zero of what is held.
 fn fall_of(part: u32) -> vec3f {
     let at = table[FALLS_AT] + FALL_WORDS * part;
-    if table[at + FALL_IS_FREE] == 0u {
+    if table[at + FALL_IS_FREE] != WHOLLY_FREE {
         return vec3f();
     }
     let acceleration = at + FALL_ACCELERATION;
     return vec3f(number(acceleration), number(acceleration + 1u), number(acceleration + 2u));
 }
 
-// Whether a sample of a vertex may touch a tool. Leaves the blocks [N/m] that contact has there, `C` of a sample with weight b:
-//   sum_s b^2 C, of the vertex alone, and sum_s b C, of the tissue around it where that moves alike
-fn begin_contact(v: u32) -> bool {
+// Adds what samples that tools may touch give to a vertex: `C` of one with weight b.
+fn add_samples(v: u32, blocks: ptr<function, Blocks>) {
     if table[SAMPLE_OFFSETS_AT] == 0u {
-        return false;
+        return;
     }
-    var own: array<f32, 6>;
-    var whole: array<f32, 6>;
-    var may_touch = false;
     let offsets = table[SAMPLE_OFFSETS_AT] + v;
     let end = table[offsets + 1u];
     for (var i = table[offsets]; i < end; i++) {
@@ -55,22 +52,33 @@ fn begin_contact(v: u32) -> bool {
         if loads[at].w == 0.0 {
             continue;
         }
-        may_touch = true;
+        (*blocks).may_touch = true;
         let weight = abs(number(entry + 1u));
         let a = loads[at + 1u];
         let b = loads[at + 2u];
         let block = array<f32, 6>(a.x, a.y, a.z, a.w, b.x, b.y);
         for (var k = 0u; k < 6u; k++) {
-            own[k] += weight * weight * block[k];
-            whole[k] += weight * block[k];
+            (*blocks).own[k] += weight * weight * block[k];
+            (*blocks).whole[k] += weight * block[k];
         }
     }
+}
+
+// Whether a vertex may touch a tool, or other tissue. Leaves the blocks [N/m] that contact has there:
+//   sum_s b^2 C, of the vertex alone, and sum_s b C, of the tissue around it where that moves alike
+fn begin_contact(v: u32) -> bool {
+    if table[SAMPLE_OFFSETS_AT] == 0u && !has_skin() {
+        return false;
+    }
+    var blocks: Blocks;
+    add_samples(v, &blocks);
+    add_meetings(v, &blocks);
     let into = levels[LEVELS_CONTACT] + CONTACT_NUMBERS * v;
     for (var k = 0u; k < 6u; k++) {
-        multilevel[into + k] = own[k];
-        multilevel[into + 6u + k] = whole[k];
+        multilevel[into + k] = blocks.own[k];
+        multilevel[into + 6u + k] = blocks.whole[k];
     }
-    return may_touch;
+    return blocks.may_touch;
 }
 
 fn begin_vertex(v: u32, fall: vec3f) {
@@ -135,7 +143,7 @@ fn begin_solves(
     }
     let row = piece_row(job.first + place);
     let part = table[row + PIECE_PART];
-    let slides = job.parameter != 1.0 && is_free(part) && is_pressed(part);
+    let slides = job.parameter != 1.0 && has_free_body(part) && is_pressed(part);
     own_share = select(job.parameter, 1.0, slides);
     if job.first + place == table[part_row(part) + PART_VERTEX_PIECES] {
         begin_record(part, slides, local);

@@ -34,6 +34,8 @@ const END_LIFTED: u32 = 42u;
 const END_WORK_BEFORE: u32 = 43u;
 const END_WORK_AFTER: u32 = 44u;
 const END_NEAR: u32 = 46u;
+// Energy [J] that contact of tissue with tissue has gained because it was found anew.
+const END_GAINED: u32 = 47u;
 
 var<workgroup> is_trusted: u32;
 var<workgroup> both: array<f32, 48>;
@@ -217,7 +219,9 @@ fn measure_end(
     } else {
         for (var i = table[row + PIECE_FIRST] + local; i < table[row + PIECE_END]; i += THREADS) {
             let element = member(i);
-            if element >= table[FIRST_SAMPLE_AT] {
+            if element >= table[FIRST_MEETING_AT] {
+                add_meeting_end(element - table[FIRST_MEETING_AT], is_trial, &sums, &more);
+            } else if element >= table[FIRST_SAMPLE_AT] {
                 add_sample_end(element - table[FIRST_SAMPLE_AT], is_trial, &sums, &more);
             } else {
                 add_element_end(element, is_trial, &sums);
@@ -236,11 +240,13 @@ fn measure_end(
 }
 
 // How the step of a part ends: 0 with the last solve, 1 with the first, 2 where it began; the velocity that is not
-// scaled, and the factor for velocities relative to it.
+// scaled, and the factor for velocities relative to it; what all velocities [m/s] and places [m] change by.
 struct End {
     solve: u32,
     share: f32,
     drift: vec3f,
+    push: vec3f,
+    way: vec3f,
 }
 
 var<workgroup> end: End;
@@ -297,7 +303,7 @@ fn choose_end() -> End {
         k = 1u;
         balance = balance_of(1u);
         if !is_possible(balance) || own_share == 1.0 {
-            return End(2u, 0.5, vec3f());
+            return End(2u, 0.5, vec3f(), vec3f(), vec3f());
         }
     }
     var drift = vec3f();
@@ -305,10 +311,30 @@ fn choose_end() -> End {
         drift = sum_at(END_FIRST + 3u * k) + sum_at(END_MOMENTUM + 3u * k) * (1.0 / both[END_MASS]);
     }
     var share = 1.0;
-    if balance.kinetic > balance.given && balance.kinetic > 0.0 {
-        share = sqrt(max(balance.given, 0.0) / balance.kinetic);
+    // What finding triangles anew has added is nothing that the step began with.
+    let given = balance.given - max(both[END_GAINED], 0.0);
+    if balance.kinetic > given && balance.kinetic > 0.0 {
+        share = sqrt(max(given, 0.0) / balance.kinetic);
     }
-    return End(k, share, drift);
+    return End(k, share, drift, vec3f(), vec3f());
+}
+
+// What of the momentum a solve that stops early has left out where tissue meets tissue and nothing holds it (step/momentum.rs): all
+// of a part moves as one, which changes no strain. Of the last solve alone: the first one ends earlier in time.
+fn keep_momentum(part: u32) {
+    if !has_skin() || is_held() || end.solve != 0u {
+        return;
+    }
+    let first = first_vertex_of(part);
+    let inverse = 1.0 / both[END_MASS];
+    let before = vertex_data_of(QN_START_VELOCITIES, first).xyz + sum_at(END_MOMENTUM_START) * inverse;
+    let gained = sum_at(END_LOAD) * (inverse * frame.dt);
+    // Where the part's first vertex is now other workgroups may have changed already.
+    let stage = vertex_data_of(QN_STAGE_START, first).xyz - vertex_data_of(PREVIOUS, first).xyz;
+    let moved = stage + sum_at(END_FIRST) * solve_dt() + sum_at(END_SHIFT) * inverse;
+    let share = select(0.5, 1.0, own_share == 1.0);
+    end.push = before - end.drift + gained;
+    end.way = (before + gained * share) * frame.dt - moved;
 }
 
 // Vertices, piece by piece: `job.first` is the first of these.
@@ -346,6 +372,7 @@ fn end_step(
     workgroupBarrier();
     if local == 0u {
         end = choose_end();
+        keep_momentum(part);
         if piece == table[part_row(part) + PART_VERTEX_PIECES] {
             report(part);
         }
@@ -366,7 +393,8 @@ fn end_vertex(v: u32, now: End, is_trial: bool) {
         x = start;
         velocity = vertex_data_of(QN_START_VELOCITIES, v).xyz;
     }
-    velocity = now.drift + (velocity - now.drift) * now.share;
+    x += now.way;
+    velocity = now.drift + (velocity - now.drift) * now.share + now.push;
     if vertex_data_of(EXTERNAL_FORCES, v).w == 0.0 {
         x = vertex_data_of(TARGETS, v).xyz;
         velocity = (x - start) * frame.inverse_dt;

@@ -94,6 +94,8 @@ fn evaluate_elements(
             change = squared * evaluate_recovered(element / LANES, element % LANES);
         } else if element < tet_lanes {
             change = squared * evaluate_tet(element / LANES, element % LANES);
+        } else if element >= table[FIRST_MEETING_AT] {
+            change = squared * evaluate_meeting(element - table[FIRST_MEETING_AT]);
         } else if element >= table[FIRST_SAMPLE_AT] {
             change = squared * evaluate_sample(element - table[FIRST_SAMPLE_AT]);
         } else {

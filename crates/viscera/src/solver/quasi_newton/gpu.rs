@@ -29,6 +29,8 @@ impl Recorder<'_> {
         match stage {
             QuasiNewtonStage::Begin => {
                 into.push(self.vertices(&kernels::APPLY_UPDATES, 1));
+                // Behind the pins of the step, which tell how far tissue goes in it.
+                self.find_meetings(into);
                 let mut begin = self.of_vertices(&kernels::BEGIN_SOLVES, solve);
                 // Two solves leave the record of the second.
                 begin.job.set_first = u32::from(solve == Solve::First);

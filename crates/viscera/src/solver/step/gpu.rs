@@ -5,6 +5,7 @@
 //! that a stage has nothing to do for pay a look at their record. Of a step that passes, the search is six dispatches
 //! that do nothing.
 
+use super::contacts::meetings::Meetings;
 use super::contacts::on_device::{MOST_TOOLS, Samples};
 use super::modes::*;
 use super::stage::{GuardStage, StepStage};
@@ -36,6 +37,10 @@ impl Recorder<'_> {
                     let dispatch = self.threads(&kernels::REPORT_TOOLS, of(groups));
                     into.push(Dispatch { groups: MOST_TOOLS as u32, ..dispatch });
                 }
+                if let Some(meetings) = Meetings::known(self.meetings) {
+                    let job = Job { count: meetings.count(), ..Job::default() };
+                    into.push(self.threads(&kernels::END_MEETINGS, job));
+                }
             }
             StepStage::MeasureStrain => self.each_set(&kernels::MEASURE_STRAIN, into),
             StepStage::Predict { start, is_kept } => self.predict(start, is_kept, into),
@@ -47,6 +52,25 @@ impl Recorder<'_> {
                 into.push(self.each(&kernels::LIMIT_VELOCITIES, job));
             }
         }
+    }
+
+    /// Finds where tissue meets tissue: six dispatches, once a step.
+    pub fn find_meetings(&self, into: &mut Vec<Dispatch>) {
+        let Some(meetings) = Meetings::known(self.meetings) else { return };
+        let of = |count: u32| Job { count, ..Job::default() };
+        into.push(self.threads(&kernels::PLACE_SKIN, of(meetings.points)));
+        into.push(self.threads(&kernels::TURN_SKIN, of(meetings.triangles)));
+        into.push(self.threads(&kernels::BOX_SKIN, of(meetings.leaves)));
+        let alone =
+            |kernel: &'static Kernel, job: Job| Dispatch { groups: 1, ..self.threads(kernel, job) };
+        let vertices = self.layout.vertex_count() as u32;
+        let job = Job { set_first: meetings.levels, ..of(vertices) };
+        into.push(alone(&kernels::PREPARE_SKIN, job));
+        let parameter = ahead(self.settings) as f32;
+        let job = Job { parameter, ..of(meetings.count()) };
+        into.push(self.threads(&kernels::FIND_MEETINGS, job));
+        let job = Job { set_first: meetings.passes(), ..of(meetings.count()) };
+        into.push(alone(&kernels::SORT_MEETINGS, job));
     }
 
     /// Writes a stage of the guard down.

@@ -10,6 +10,7 @@ mod motion;
 pub mod on_device;
 pub mod on_device_explicit;
 mod on_device_robust;
+mod on_device_tissue;
 mod on_device_xpbd;
 mod organs;
 mod passes;

@@ -2,7 +2,7 @@
 
 use super::dispatch::{DispatchTraffic, NOTHING};
 use super::table::{Count, Line};
-use super::{explicit, quasi_newton, step, xpbd};
+use super::{explicit, meetings, quasi_newton, step, xpbd};
 use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
@@ -15,6 +15,7 @@ use crate::solver::gpu::record::Dispatch;
 use crate::solver::gpu::slots::{Slot, unknowns_size};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
 use crate::solver::quasi_newton::tables::{ENTRY_WORDS, GROUP_ENTRY_WORDS, Header, OF_VERTEX};
+use crate::solver::step::contacts::meetings::Meetings;
 use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device::{Extent, ring_entries};
 use crate::solver::step::strain::is_recovered;
@@ -35,6 +36,7 @@ pub struct Counts<'a> {
     groups: f64,
     levels: Levels,
     recovered: Recovered,
+    meetings: Option<Meetings>,
     /// Vertices of each cluster of tetrahedra.
     cluster_vertices: Vec<u32>,
 }
@@ -155,6 +157,7 @@ impl<'a> Counts<'a> {
             groups: f64::from(on_device.parts.groups()),
             levels: levels.map(|(l, words)| Levels::new(l.header, words)).unwrap_or_default(),
             recovered: Recovered::new(layout),
+            meetings: Meetings::new(layout, settings),
             cluster_vertices: ClusterTables::new(layout)
                 .map(|tables| tables.rows.iter().map(|row| row.vertex_count).collect())
                 .unwrap_or_default(),
@@ -277,7 +280,7 @@ impl<'a> Counts<'a> {
             | Count::PieceCorner
             | Count::PieceElement
             | Count::PieceVertex => self.of_job_pieces(count, dispatch),
-            of_recovered => self.recovered.of(of_recovered),
+            other => self.recovered.of(other) + self.of_meetings(other),
         }
     }
 
@@ -292,6 +295,21 @@ impl<'a> Counts<'a> {
             Count::SampleGroup => f64::from(groups),
             _ => f64::from(samples),
         }
+    }
+
+    /// Of the skin on which tissue meets tissue.
+    fn of_meetings(&self, count: Count) -> f64 {
+        let Some(all) = self.meetings else { return 0.0 };
+        f64::from(match count {
+            Count::SkinPoint => all.points,
+            Count::SkinTriangle => all.triangles,
+            Count::SkinCorner => 3 * all.triangles,
+            Count::SkinNode => all.nodes,
+            Count::SkinLeaf => all.leaves,
+            Count::MeetingCorner => 4 * all.count(),
+            Count::Meeting => all.count(),
+            _ => 0,
+        })
     }
 
     /// Of pieces that are of elements or of vertices.
@@ -349,10 +367,8 @@ impl Counts<'_> {
 
 /// What the tables say of all kernels.
 pub fn entries() -> impl Iterator<Item = &'static super::table::Entry> {
-    let of_pictures = super::values::TABLE;
-    [step::TABLE, xpbd::TABLE, explicit::TABLE, quasi_newton::TABLE, of_pictures]
-        .into_iter()
-        .flatten()
+    let own = [step::TABLE, xpbd::TABLE, explicit::TABLE, quasi_newton::TABLE, meetings::TABLE];
+    own.into_iter().flatten().chain(super::values::TABLE)
 }
 
 fn entry(kernel: &Kernel) -> Option<&'static super::table::Entry> {

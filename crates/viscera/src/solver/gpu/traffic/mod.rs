@@ -13,6 +13,7 @@
 mod counts;
 mod dispatch;
 mod explicit;
+mod meetings;
 mod quasi_newton;
 mod step;
 mod table;
@@ -74,7 +75,7 @@ impl Traffic {
     /// Of a step of a model with so many small steps, which count for the explicit method alone.
     pub fn new(model: &Model<f32>, settings: &SolverSettings, small_steps: u32) -> Self {
         let settings = &settings.chosen_on_device();
-        let layout = Layout::new(model, settings);
+        let layout = Layout::on_device(model, settings);
         let Recorded { plan, record, on_device, levels } = Recorded::new(&layout, settings);
         let of_levels = levels.as_ref().map(|(levels, words)| (levels, words.as_slice()));
         let counts = Counts::new(&layout, settings, &on_device, of_levels);

@@ -108,6 +108,15 @@ pub enum Count {
     /// A vertex, where there are samples.
     SampleVertex,
     SampleGroup,
+    /// Of the skin on which tissue meets tissue: points, triangles and their corners, nodes and leaves of its tree; samples with
+    /// ties, and their corners.
+    SkinPoint,
+    SkinTriangle,
+    SkinCorner,
+    SkinNode,
+    SkinLeaf,
+    Meeting,
+    MeetingCorner,
     /// Vertices of clusters of tetrahedra.
     JobClusterVertex,
     JobCluster,

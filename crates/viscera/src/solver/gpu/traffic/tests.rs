@@ -83,7 +83,7 @@ struct Laid {
 
 impl Laid {
     fn new(model: &Model<f32>, settings: &SolverSettings) -> Self {
-        let layout = Layout::new(model, settings);
+        let layout = Layout::on_device(model, settings);
         let recorded = Recorded::new(&layout, settings);
         let table = recorded.on_device.table(&layout, settings);
         let levels = recorded.levels.as_ref().map(|(levels, _)| levels);

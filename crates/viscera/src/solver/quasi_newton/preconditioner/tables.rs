@@ -12,6 +12,7 @@ use super::full::FullSums;
 use super::sums::{DiagonalSums, Groups};
 use super::{Coarseness, OfPart};
 use crate::layout::Layout;
+use crate::settings::HAS_MEETINGS;
 use crate::solver::quasi_newton::choice::Choice;
 
 impl Coarseness {
@@ -175,7 +176,8 @@ impl Tables {
         for (part, choice) in parts.into_iter().zip(choices) {
             builder.add(&part, choice);
         }
-        builder.finish(!layout.samples.is_empty())
+        let meets = layout.skin.is_some() && HAS_MEETINGS;
+        builder.finish(!layout.samples.is_empty() || meets)
     }
 }
 

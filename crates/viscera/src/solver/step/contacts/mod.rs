@@ -14,6 +14,8 @@
 mod explicit;
 mod far;
 mod found;
+#[cfg(feature = "gpu")]
+pub mod meetings;
 mod of_vertices;
 #[cfg(feature = "gpu")]
 pub mod on_device;

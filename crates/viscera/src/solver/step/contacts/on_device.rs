@@ -211,6 +211,8 @@ impl ToolKind {
             record.bricks = [x as u32, y as u32, z as u32, first];
             record.bounds = single([grid.margin(), grid.steepest(), grid.thinnest(), 0.0]);
         }
+        let reach = tool.shape.reach();
+        record.bounds[3] = if reach.is_finite() { reach as f32 } else { 0.0 };
         record
     }
 }
@@ -388,6 +390,9 @@ impl DeviceTools {
     pub fn rows(layout: &Layout<f32>, touches: &[Touch]) -> Vec<[f32; 4]> {
         let mut rows = vec![[0.0; 4]; SAMPLE_VECTORS * layout.samples.len()];
         let key = |touch: &Touch| (layout.part_of_sample(touch.sample), touch.sample);
+        // Where parts are one on the device, what a state has kept has another order.
+        let mut touches = touches.to_vec();
+        touches.sort_by_key(|touch| (key(touch), touch.tool));
         for (sample, rows) in layout.samples.iter().zip(rows.chunks_exact_mut(SAMPLE_VECTORS)) {
             let own = (sample.part as usize, sample.number);
             let first = touches.partition_point(|touch| key(touch) < own);

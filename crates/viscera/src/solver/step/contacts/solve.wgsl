@@ -40,7 +40,10 @@ fn evaluate_sample(sample: u32) -> f32 {
 
 // On a vertex, times he^2.
 fn contact_force(v: u32) -> vec3f {
-    var sum = vec3f();
+    var sum = meeting_force(v);
+    if table[SAMPLE_OFFSETS_AT] == 0u {
+        return sum;
+    }
     let offsets = table[SAMPLE_OFFSETS_AT] + v;
     let end = table[offsets + 1u];
     for (var i = table[offsets]; i < end; i++) {

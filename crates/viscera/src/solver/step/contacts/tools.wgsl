@@ -30,7 +30,8 @@ struct ToolKind {
     // Kind of shape; stiffness, thickness [m] and friction of the contact.
     law: vec4f,
     // Of a closed surface (contact/distance_grid): the lower corner of its grid and the edge of small cells [m]; bricks along each
-    // axis and its first word; margin [m], the steepest that its distance is, half of the thickness of its walls [m].
+    // axis and its first word; margin [m], the steepest that its distance is, half of the thickness of its walls [m]; of
+    // every tool how far it reaches from its origin [m], or nothing.
     grid: vec4f,
     bricks: vec4u,
     bounds: vec4f,
@@ -410,8 +411,6 @@ fn contact_change(touching: Touching, pose: u32, before: Met, after: Met, way: v
     change += (SECOND_STAGE - 1.0) * k * half_square_change(gap - half, later - half, nearer);
     let limit = touching.friction.w;
     if limit > 0.0 {
-        let a = length_of(before.slip);
-        let b = length_of(after.slip);
         var more = after.slip - before.slip;
         if (touching.marks & HAS_PLANE) != 0u {
             more = way;
@@ -419,16 +418,23 @@ fn contact_change(touching: Touching, pose: u32, before: Met, after: Met, way: v
                 more = way - before.normal * dot(before.normal, way);
             }
         }
-        let squares = dot(more, before.slip + after.slip);
-        if k * max(a, b) <= limit {
-            change += 0.5 * k * squares;
-        } else if k * min(a, b) > limit {
-            change += limit * squares / (a + b);
-        } else {
-            change += friction_energy(k, limit, b) - friction_energy(k, limit, a);
-        }
+        change += drag_change(k, limit, before.slip, after.slip, more);
     }
     return change;
+}
+
+// Of friction from one slip to another, `more` apart.
+fn drag_change(k: f32, limit: f32, before: vec3f, after: vec3f, more: vec3f) -> f32 {
+    let a = length_of(before);
+    let b = length_of(after);
+    let squares = dot(more, before + after);
+    if k * max(a, b) <= limit {
+        return 0.5 * k * squares;
+    }
+    if k * min(a, b) > limit {
+        return limit * squares / (a + b);
+    }
+    return friction_energy(k, limit, b) - friction_energy(k, limit, a);
 }
 
 fn friction_energy(k: f32, limit: f32, length: f32) -> f32 {

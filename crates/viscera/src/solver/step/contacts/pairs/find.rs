@@ -134,7 +134,7 @@ impl Pairs {
     }
 
     /// Adds a pair.
-    fn push(&mut self, skin: &LaidSkin, pair: Pair) {
+    pub(super) fn push(&mut self, skin: &LaidSkin, pair: Pair) {
         self.stencils.push(skin, &pair, &skin.samples[pair.sample as usize]);
         self.pairs.push(pair);
     }

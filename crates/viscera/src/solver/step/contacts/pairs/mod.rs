@@ -116,6 +116,19 @@ impl Pairs {
         }
     }
 
+    /// Pairs that a device has found: of the whole model, for measures that ask for forces alone.
+    #[cfg(feature = "gpu")]
+    pub fn found<S: Real>(layout: &Layout<S>, all: Vec<Pair>) -> Self {
+        let mut pairs = Self::default();
+        if let Some(skin) = &layout.skin {
+            pairs.stencils = Stencils::new(skin, all.len());
+            for pair in all {
+                pairs.push(skin, pair);
+            }
+        }
+        pairs
+    }
+
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         let Search { tree, seen, at, ways, normals, met, kept, .. } = &self.search;
@@ -126,6 +139,11 @@ impl Pairs {
             + size_of_val(&met[..])
             + size_of_val(&kept[..])
             + [seen, at, ways, normals].map(|all| size_of_val(&all[..])).iter().sum::<usize>()
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[Pair] {
+        &self.pairs
     }
 
     /// How many there are.
