@@ -38,7 +38,7 @@ fn pushed_at(v: u32) -> Pushed {
     return sum;
 }
 
-fn stiffness_of(pushed: Pushed) -> mat3x3f {
+fn stiffness_felt(pushed: Pushed) -> mat3x3f {
     let m = pushed.mixed;
     return mat3x3f(
         vec3f(pushed.direct.x, m.z, m.y),
@@ -56,7 +56,7 @@ fn pushed_velocity(v: u32, h: f32, inverse_mass: f32, velocity: vec3f, change: v
         put_vertex_data(REFERENCE, v, vec4f(0.0, 0.0, 0.0, work));
         return velocity + change;
     }
-    let stiffness = stiffness_of(pushed);
+    let stiffness = stiffness_felt(pushed);
     let m = mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0)) + stiffness * inverse_mass;
     let given = change + (pushed.force * (1.0 / h) - stiffness * velocity) * inverse_mass;
     let a = cross(m[1], m[2]);
@@ -72,5 +72,5 @@ fn pushed_velocity(v: u32, h: f32, inverse_mass: f32, velocity: vec3f, change: v
 // Times h^2, as in the last small step.
 fn contact_load(v: u32) -> vec3f {
     let pushed = pushed_at(v);
-    return pushed.force - stiffness_of(pushed) * vertex_data_of(VELOCITIES, v).xyz;
+    return pushed.force - stiffness_felt(pushed) * vertex_data_of(VELOCITIES, v).xyz;
 }
