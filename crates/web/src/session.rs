@@ -294,14 +294,15 @@ impl Session {
     /// Begins a frame of one simulation. The CPU has computed it then; a device is asked by [`Session::ready`]. Nothing
     /// happens while one is under way.
     pub fn advance(&mut self, run: usize) -> Result<(), String> {
+        // What tools touch comes with the balance.
+        let shows_touches = self.coloring == Coloring::Pressure;
         let state = self.state(run)?;
         if state.run.is_under_way() {
             return Ok(());
         }
         let [wanted, ..] = state.measures;
         state.measures = [false, wanted, state.measures[2]];
-        // What tools touch comes with the balance.
-        let reading = match wanted || self.coloring == Coloring::Pressure {
+        let reading = match wanted || shows_touches {
             true => FrameReading::Balance,
             false => FrameReading::State,
         };
