@@ -6,7 +6,7 @@ use super::error::GpuError;
 use super::reading::read;
 use super::slots::Slot;
 use super::solver::GpuSolver;
-use crate::contact::{Sample, Tool, Wrench, beyond_devices};
+use crate::contact::{Tool, Wrench, beyond_devices};
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Point;
@@ -175,10 +175,6 @@ impl GpuSolver {
         let layout = self.layout_of(model)?;
         let poses = self.tools.all.poses().to_vec();
         let mut contact = ContactState { poses, ..ContactState::default() };
-        // In the order of the model's parts, of which several may be one here.
-        let part = |samples: &[Sample], number: u32| {
-            samples.get(number as usize).map(|sample| model.part_of(sample.vertices[0]))
-        };
         if self.samples().is_some() {
             let user = |v: usize| layout.numbering.order[v] as usize;
             let place =
@@ -187,8 +183,6 @@ impl GpuSolver {
                 contact.touches =
                     DeviceTools::touches(&layout, bytemuck::cast_slice(read[0]), place);
             })?;
-            let all = &mut contact.touches;
-            all.sort_by_key(|at| (part(&model.samples, at.sample), at.sample, at.tool));
         }
         if self.meetings().is_some() {
             let ranges = [self.whole(Slot::Meetings), self.whole(Slot::Torn)];
@@ -196,8 +190,12 @@ impl GpuSolver {
                 contact.pairs = meetings::kept(&layout, bytemuck::cast_slice(read[0]));
                 meetings::torn(&layout, bytemuck::cast_slice(read[1]), &mut contact.torn);
             })?;
-            let all = &mut contact.pairs;
-            all.sort_by_key(|kept| (part(&model.skin.samples, kept.sample), kept.sample));
+            // In the order of the model's parts, of which several may be one here.
+            let part = |number: u32| {
+                let sample = model.skin.samples.get(number as usize);
+                sample.map(|sample| model.part_of(sample.vertices[0]))
+            };
+            contact.pairs.sort_by_key(|kept| (part(kept.sample), kept.sample));
         }
         Ok(contact)
     }

@@ -13,6 +13,7 @@ use crate::contact::{Friction, MOST_TOOLS_ON_DEVICES, Shape, Side, Tool, Touch, 
 use crate::layout::{LaidSample, Layout};
 use crate::scalar::rigid::{RigidTransform, axis_times_sine, rotation_vector};
 use crate::scalar::{Vec3, vec3};
+use crate::sorting;
 use crate::state::ContactState;
 
 /// Whether kernels are there.
@@ -365,38 +366,40 @@ impl DeviceTools {
         contacts
     }
 
-    /// What is kept of the last step, of the vectors that it has left; `x`: places [m] in the solver's numbering.
+    /// What is kept of the last step, of the vectors that it has left, in the order of the model's parts, of which several may be one
+    /// here; `x`: places [m] in the solver's numbering.
     pub fn touches(
         layout: &Layout<f32>,
         rows: &[[f32; 4]],
         x: impl Fn(usize) -> Vec3<f32>,
     ) -> Vec<Touch> {
-        let all = layout.samples.iter().zip(rows.chunks_exact(SAMPLE_VECTORS));
-        let touches = all.flat_map(|(sample, rows)| {
+        let joined = layout.joined();
+        let part = |sample: &LaidSample| {
+            joined.map_or(sample.part, |all| all.of_vertices[sample.vertices[0] as usize])
+        };
+        let mut touches = Vec::new();
+        for (sample, rows) in layout.samples.iter().zip(rows.chunks_exact(SAMPLE_VECTORS)) {
             let at = sample.mean(&x);
             let kept = slots(rows).filter(|slot| slot.marks & IS_KEPT != 0);
-            let mut of_sample: Vec<Touch> =
-                kept.map(|slot| slot.touch(sample.number, at)).collect();
-            of_sample.sort_by_key(|touch| touch.tool);
-            of_sample
-        });
-        let mut touches: Vec<Touch> = touches.collect();
-        touches
-            .sort_by_key(|touch| (layout.part_of_sample(touch.sample), touch.sample, touch.tool));
-        touches
+            let key = |slot: &Slot| key(part(sample), sample.number, slot.tool);
+            touches.extend(kept.map(|slot| (key(&slot), slot.touch(sample.number, at))));
+        }
+        let order = sorting::by_key(0..touches.len() as u32, |i| touches[i as usize].0);
+        order.into_iter().map(|i| touches[i as usize].1.clone()).collect()
     }
 
     /// Vectors of samples of which this was kept.
     pub fn rows(layout: &Layout<f32>, touches: &[Touch]) -> Vec<[f32; 4]> {
         let mut rows = vec![[0.0; 4]; SAMPLE_VECTORS * layout.samples.len()];
-        let key = |touch: &Touch| (layout.part_of_sample(touch.sample), touch.sample);
-        // Where parts are one on the device, what a state has kept has another order.
-        let mut touches = touches.to_vec();
-        touches.sort_by_key(|touch| (key(touch), touch.tool));
+        let of = |touch: &Touch| {
+            key(layout.part_of_sample(touch.sample) as u32, touch.sample, touch.tool)
+        };
+        let order = sorting::by_key(0..touches.len() as u32, |i| of(&touches[i as usize]));
+        let touches: Vec<&Touch> = order.into_iter().map(|i| &touches[i as usize]).collect();
         for (sample, rows) in layout.samples.iter().zip(rows.chunks_exact_mut(SAMPLE_VECTORS)) {
-            let own = (sample.part as usize, sample.number);
-            let first = touches.partition_point(|touch| key(touch) < own);
-            let of_sample = touches[first..].iter().take_while(|touch| key(touch) == own);
+            let [own, _] = key(sample.part, sample.number, 0);
+            let first = touches.partition_point(|touch| of(touch)[0] < own);
+            let of_sample = touches[first..].iter().take_while(|touch| of(touch)[0] == own);
             let mut used = 0;
             for (touch, slot) in of_sample.zip(rows[FIRST_SLOT..].chunks_exact_mut(SLOT_VECTORS)) {
                 let tied = if touch.is_tied { WILL_BE_TIED } else { 0 };
@@ -410,6 +413,11 @@ impl DeviceTools {
         }
         rows
     }
+}
+
+/// By part, sample and tool.
+fn key(part: u32, sample: u32, tool: u32) -> [u64; 2] {
+    [u64::from(part) << 32 | u64::from(sample), tool.into()]
 }
 
 /// A slot of a sample.
