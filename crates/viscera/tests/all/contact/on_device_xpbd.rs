@@ -61,7 +61,7 @@ fn sweeps_end_where_the_processors_do() {
             let places =
                 [&gpu.state, &here.state].map(|state| largest(&state.positions, x) / moved);
             let forces = [&found, &on_cpu].map(|found| off(found, &expected));
-            // Where the processor ends in single precision elsewhere, because rounding decides what is taken back.
+            // Where the processor ends in single precision elsewhere, because rounding decides which steps are rejected.
             for ([found, single], worst) in [places, forces].into_iter().zip(&mut worst) {
                 assert!(found < 2.0 * single + 1e-4, "{name} {step}: {found:e}, {single:e}");
                 *worst = worst.max(if single < 1e-3 { found } else { 0.0 });
@@ -81,7 +81,7 @@ fn sweeps_end_where_the_processors_do() {
 fn settled_forces_of_sweeps_are_the_processors() {
     let (_, clusters) = &variants()[1];
     let settings = SolverSettings { iterations: Count::Of(10), ..clusters.clone() };
-    // Where friction holds there is more than one place of rest, and which it is depends on what was taken back on the way.
+    // Where friction holds there is more than one place of rest, and which it is depends on the steps that were rejected on the way.
     for (friction, most) in [(0.0, 1e-4), (0.5, 5e-4)] {
         let mut truth = scene::<f64>(&settings);
         let mut here = scene::<f32>(&settings);
