@@ -7,7 +7,7 @@ use crate::common::device::{device, largest};
 use std::sync::Arc;
 use viscera::contact::{DistanceGrid, Shape, Tool, Wrench};
 use viscera::scalar::rigid::rotation_matrix;
-use viscera::scalar::{Real, vec3};
+use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{Count, Elements, Integrator, Method, SolverSettings};
 use viscera::solver::Inputs;
 use viscera::solver::balance::ForceBalance;
@@ -221,7 +221,7 @@ fn passes_are_about_as_many_as_the_processors() {
         let before = truth.state.clone();
         advance(&mut truth);
         let moved = largest(&before.positions, &truth.state.positions);
-        let single = |all: &[viscera::scalar::Vec3<f64>]| all.iter().map(|x| x.cast()).collect();
+        let single = |all: &[Vec3<f64>]| all.iter().map(|x| x.cast()).collect();
         let scene = |passes: u32| {
             let mut here = scene_of::<f32>(&with(passes, kind), cells);
             here.state.positions = single(&before.positions);
@@ -254,6 +254,35 @@ fn passes_are_about_as_many_as_the_processors() {
     }
 }
 
+/// How far a block creeps [m], and its acceleration downhill [m/s^2], in the second of these times [s]; `gravity` at a step's beginning.
+pub fn slide(
+    gpu: &mut OnDevice,
+    scene: &mut Scene<f32>,
+    gravity: impl Fn(f64) -> Vec3<f64>,
+    [before, during]: [f64; 2],
+) -> [f64; 2] {
+    let mut run = |time: f64| {
+        for _ in 0..(time / scene.dt).round() as u32 {
+            scene.inputs.gravity = gravity(f64::from(scene.steps) * scene.dt).cast();
+            scene.steps += 1;
+            gpu.gpu.step(&scene.model, &scene.inputs, scene.dt).expect("a legal step");
+        }
+        gpu.gpu.read_frame(&scene.model, &mut scene.state).expect("a device");
+        let speed = scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
+        (scene.state.positions.clone(), speed)
+    };
+    let (first, slow) = run(before);
+    let (last, fast) = run(during);
+    let crept = last.iter().zip(&first).map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+    [crept.into(), (fast - slow) / during]
+}
+
+/// The acceleration of a block [m/s^2] on a slope [degrees], with friction.
+pub fn downhill(slope: f64, friction: f64) -> f64 {
+    let angle = slope.to_radians();
+    9.81 * (libm::sin(angle) - friction * libm::cos(angle))
+}
+
 /// A block on a slope: it holds below the angle of friction, and slides as fast as it should above.
 #[test]
 fn a_block_slides_as_fast_as_it_should() {
@@ -265,23 +294,8 @@ fn a_block_slides_as_fast_as_it_should() {
         let (mut scene, gravity) = tilted::<f32>(&usual, 2, 10.0, FRICTION, exact + more);
         scene.state.contact = ContactState::of(&scene.inputs.tools);
         let mut gpu = OnDevice::new(&scene);
-        let mut run = |scene: &mut Scene<f32>, time: f64| {
-            for _ in 0..(time / scene.dt).round() as u32 {
-                scene.inputs.gravity = gravity(f64::from(scene.steps) * scene.dt).cast();
-                scene.steps += 1;
-                gpu.gpu.step(&scene.model, &scene.inputs, scene.dt).expect("a legal step");
-            }
-            gpu.gpu.read_frame(&scene.model, &mut scene.state).expect("a device");
-            let speed = scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
-            (scene.state.positions.clone(), speed)
-        };
-        run(&mut scene, 0.9);
-        let (before, slow) = run(&mut scene, 0.2);
-        let (after, fast) = run(&mut scene, 0.5);
-        let crept = after.iter().zip(&before).map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
-        let angle = (exact + more).to_radians();
-        let wanted = 9.81 * (libm::sin(angle) - FRICTION * libm::cos(angle));
-        let found = (fast - slow) / 0.5;
+        let [crept, found] = slide(&mut gpu, &mut scene, gravity, [1.1, 0.5]);
+        let wanted = downhill(exact + more, FRICTION);
         println!("{more}: {crept:e} m, {found} of {wanted} m/s^2");
         if more < 0.0 {
             // Places are stored to 2e-9 m.

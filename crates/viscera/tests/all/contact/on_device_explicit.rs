@@ -2,7 +2,7 @@
 
 use super::grasps::{GRASPED, Plan};
 use super::motion::DOWNHILL;
-use super::on_device::{OnDevice, off, tools};
+use super::on_device::{OnDevice, downhill, off, slide, tools};
 use super::on_device_robust::Account;
 use super::{Block, Scene, ramp};
 use crate::common::Random;
@@ -138,26 +138,13 @@ fn a_block_slides_as_fast_as_it_should_by_explicit_steps() {
         let mut scene = Scene::<f32>::with(&block, &explicit(Elements::Plain, 0.8), 1, inputs);
         scene.state.contact = ContactState::of(&scene.inputs.tools);
         let mut gpu = OnDevice::new(&scene);
-        let mut run = |scene: &mut Scene<f32>, time: f64| {
-            for _ in 0..(time / scene.dt).round() as u32 {
-                scene.steps += 1;
-                let now = f64::from(scene.steps) * scene.dt;
-                let angle = (exact + more).to_radians() * ramp(now, 0.1, 0.3);
-                let gravity = DOWNHILL * libm::sin(angle) - vec3(0.0, 0.0, libm::cos(angle));
-                scene.inputs.gravity = (gravity * 9.81).cast();
-                gpu.gpu.step(&scene.model, &scene.inputs, scene.dt).expect("a legal step");
-            }
-            gpu.gpu.read_frame(&scene.model, &mut scene.state).expect("a device");
-            let speed = scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
-            (scene.state.positions.clone(), speed)
+        let dt = scene.dt;
+        let gravity = |time: f64| {
+            let angle = (exact + more).to_radians() * ramp(time + dt, 0.1, 0.3);
+            (DOWNHILL * libm::sin(angle) - vec3(0.0, 0.0, libm::cos(angle))) * 9.81
         };
-        run(&mut scene, 0.5);
-        let (before, slow) = run(&mut scene, 0.1);
-        let (after, fast) = run(&mut scene, 0.3);
-        let crept = after.iter().zip(&before).map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
-        let angle = (exact + more).to_radians();
-        let wanted = 9.81 * (libm::sin(angle) - FRICTION * libm::cos(angle));
-        let found = (fast - slow) / 0.3;
+        let [crept, found] = slide(&mut gpu, &mut scene, gravity, [0.6, 0.3]);
+        let wanted = downhill(exact + more, FRICTION);
         println!(
             "{more}: {crept:e} m, {found} of {wanted} m/s^2, {} small steps",
             gpu.gpu.passes()

@@ -1,7 +1,7 @@
 //! Contact with tools on a graphics processor, by sweeps: XPBD with all that accelerates and guards it.
 
-use super::motion::{DOWNHILL, tilted};
-use super::on_device::{OnDevice, act, advance, off, scene};
+use super::motion::tilted;
+use super::on_device::{OnDevice, act, advance, downhill, off, scene, slide};
 use super::{Block, Scene, method};
 use crate::common::Random;
 use crate::common::device::{device, largest};
@@ -152,23 +152,8 @@ fn a_block_slides_as_fast_as_it_should_by_sweeps() {
         let (mut scene, gravity) = tilted::<f32>(&usual, 4, 2.0, FRICTION, exact + more);
         scene.state.contact = ContactState::of(&scene.inputs.tools);
         let mut gpu = OnDevice::new(&scene);
-        let mut run = |scene: &mut Scene<f32>, time: f64| {
-            for _ in 0..(time / scene.dt).round() as u32 {
-                scene.inputs.gravity = gravity(f64::from(scene.steps) * scene.dt).cast();
-                scene.steps += 1;
-                gpu.gpu.step(&scene.model, &scene.inputs, scene.dt).expect("a legal step");
-            }
-            gpu.gpu.read_frame(&scene.model, &mut scene.state).expect("a device");
-            let speed = scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
-            (scene.state.positions.clone(), speed)
-        };
-        run(&mut scene, 0.7);
-        let (before, slow) = run(&mut scene, 0.05);
-        let (after, fast) = run(&mut scene, 0.1);
-        let crept = after.iter().zip(&before).map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
-        let angle = (exact + more).to_radians();
-        let wanted = 9.81 * (libm::sin(angle) - FRICTION * libm::cos(angle));
-        let found = (fast - slow) / 0.1;
+        let [crept, found] = slide(&mut gpu, &mut scene, gravity, [0.75, 0.1]);
+        let wanted = downhill(exact + more, FRICTION);
         println!("{more}: {crept:e} m, {found} of {wanted} m/s^2");
         if more < 0.0 {
             assert!(crept < 2e-6, "{crept:e} m below the angle");

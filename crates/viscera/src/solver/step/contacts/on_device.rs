@@ -385,7 +385,7 @@ impl DeviceTools {
             touches.extend(kept.map(|slot| (key(&slot), slot.touch(sample.number, at))));
         }
         let order = sorting::by_key(0..touches.len() as u32, |i| touches[i as usize].0);
-        order.into_iter().map(|i| touches[i as usize].1.clone()).collect()
+        order.into_iter().map(|i| touches[i as usize].1).collect()
     }
 
     /// Vectors of samples of which this was kept.
