@@ -1,14 +1,16 @@
 // Contact with tools in a small step h (step/contacts/explicit.rs): samples slip where they are, planes follow.
 //
-//   (m + D) v' = m v + h (f + sum_s b f_s) + sum_s b C_s u_s h,   D = sum_s |b| C_s,   C_s = h^2 dF_s/dx sum_a |b_a|
+//   (m + D/4) (v' - v) = h (f + sum_s b f_s),   D = sum_s |b| C_s,   C_s = h^2 dF_s/dx sum_a |b_a|
 //
-// with f_s the force of the tool where it is in the middle of the small step and u_s its velocity there. Contact is much stiffer
-// than tissue. Taken where the small step leads it is stable however long that is: h^2 K_tissue <= 4 m is all that is asked. C_s
-// counts what presses and what sticks; what slides is dragged by `mu N`, whatever its speed.
+// with f_s the force of the tool where it is in the middle of the small step. Contact is much stiffer than tissue. A quarter of D
+// beside the mass (Newmark's beta; Hughes, The Finite Element Method, 9.1) makes it stable however long a small step is, without
+// damping: h^2 K <= 4 m + D wherever h^2 K_tissue <= 4 m. C_s counts what presses and what sticks; what slides is dragged by
+// `mu N`, whatever its speed.
 
 // A plane turns by less than the angle of this cosine from small step to small step.
 const SAME_SIDE: f32 = 0.5;
 const SERIES: u32 = 9u;
+const BETA: f32 = 0.25;
 
 // A tool's place.
 struct Pose {
@@ -39,11 +41,14 @@ fn pose_between(tool: u32, share: f32) -> Pose {
     return Pose(rotation, select(between, origin_of(tool, AT_END), share == 1.0));
 }
 
-// What a sample feels: its force [N], also that of the tool's own speed, and its stiffness [N/m] as xx, yy, zz and yz, xz, xy.
+// What a sample feels: its force [N] and stiffness [N/m] as xx, yy, zz and yz, xz, xy; the work [J] of tools, and what contact
+// stores [J].
 struct Pushed {
     force: vec3f,
     direct: vec3f,
     mixed: vec3f,
+    work: f32,
+    stored: f32,
 }
 
 // In the tool's frame: what is met, and felt once the anchor of friction has slipped.
@@ -93,20 +98,43 @@ fn slip_slot(at: u32, slot: u32, row: u32, share: f32, place: vec3f, h: f32, sum
     along += select(0.0, (SECOND_STAGE - 1.0) * k, met.distance < 0.5 * law.z);
     along = along * met.slope * met.slope + select(0.0, k, is_tied);
     let normal = pose.rotation * n;
+    let force = pose.rotation * felt.force;
     let turn = tools.all[tool].poses[AT_FIRST][0].xyz;
-    let way = (tools.all[tool].way.xyz + cross(turn, arm)) * (h * frame.inverse_dt);
-    let of_way = way * across + normal * (dot(normal, way) * (along - across));
-    (*sum).force += pose.rotation * felt.force + of_way;
+    (*sum).work += dot(force, tools.all[tool].way.xyz + cross(turn, arm)) * (h * frame.inverse_dt);
+    (*sum).stored += contact_energy(touching, met);
+    (*sum).force += force;
     (*sum).direct += vec3f(across) + normal * normal * (along - across);
     (*sum).mixed += normal.yxx * normal.zzy * (along - across);
 }
 
-// Leaves forces and stiffness times h^2; at the end of the step, where `share` is one, samples slip for the last time.
+// What contact stores [J] where the step begins, with its pins moved.
+fn stored_at_start(at: u32, used: u32, row: u32) -> f32 {
+    var place = vec3f();
+    for (var i = 0u; i < 4u; i++) {
+        place += start_of(table[row + i]) * number(row + SAMPLE_WEIGHTS + i);
+    }
+    var stored = 0.0;
+    for (var slot = 0u; slot < used; slot++) {
+        let touching = touching_of(at, slot, row);
+        stored += contact_energy(touching, meet(touching, AT_START, place));
+    }
+    return stored;
+}
+
+// Leaves forces and stiffness times h^2, and what tools have given until now without what contact stores. At the end of the step,
+// where `share` is one, samples slip for the last time.
 fn slip_sample(sample: u32, share: f32, h: f32) {
     let at = contact_at(sample);
     let mark = loads[at].w;
     let used = slots_used(mark);
     let row = sample_row(sample);
+    if used == 0u {
+        return;
+    }
+    var given = loads[at + 2u].z;
+    if share < 1.0 && control.small_steps_done == 0u {
+        given = stored_at_start(at, used, row);
+    }
     var place = vec3f();
     var weights = 0.0;
     for (var i = 0u; i < 4u; i++) {
@@ -118,10 +146,10 @@ fn slip_sample(sample: u32, share: f32, h: f32) {
     for (var slot = 0u; slot < used; slot++) {
         slip_slot(at, slot, row, share, place, h, &sum);
     }
-    if used > 0u {
-        let squared = h * h;
-        loads[at] = vec4f(sum.force * squared, mark);
-        loads[at + 1u] = vec4f(sum.direct, sum.mixed.x) * (squared * weights);
-        loads[at + 2u] = vec4f(sum.mixed.yz, 0.0, 0.0) * (squared * weights);
-    }
+    given += sum.work - select(0.0, sum.stored, share == 1.0);
+    let squared = h * h;
+    let added = BETA * squared * weights;
+    loads[at] = vec4f(sum.force * squared, mark);
+    loads[at + 1u] = vec4f(sum.direct, sum.mixed.x) * added;
+    loads[at + 2u] = vec4f(sum.mixed.yz * added, given, 0.0);
 }

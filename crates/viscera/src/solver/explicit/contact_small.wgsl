@@ -18,7 +18,7 @@ fn slip_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     }
 }
 
-// Force and stiffness times h^2.
+// Force times h^2, and a quarter of the stiffness times that.
 fn pushed_at(v: u32) -> Pushed {
     var sum: Pushed;
     let offsets = table[SAMPLE_OFFSETS_AT] + v;
@@ -38,6 +38,7 @@ fn pushed_at(v: u32) -> Pushed {
     return sum;
 }
 
+// A quarter of D.
 fn stiffness_felt(pushed: Pushed) -> mat3x3f {
     let m = pushed.mixed;
     return mat3x3f(
@@ -47,30 +48,26 @@ fn stiffness_felt(pushed: Pushed) -> mat3x3f {
     );
 }
 
-// The velocity after a small step in which everything else changes it by `change`: (1 + D/m) (v' - v) = change + h f/m - D v/m.
-// Keeps count of the work of contact on the tissue, impulses times mean speeds.
+// The velocity after a small step in which everything else changes it by `change`: (1 + D/4m) (v' - v) = change + h f/m. Keeps
+// the force times h^2.
 fn pushed_velocity(v: u32, h: f32, inverse_mass: f32, velocity: vec3f, change: vec3f) -> vec3f {
     let pushed = pushed_at(v);
-    var work = select(vertex_data_of(REFERENCE, v).w, 0.0, control.small_step == 1u);
     if all(pushed.force == vec3f()) && all(pushed.direct == vec3f()) {
-        put_vertex_data(REFERENCE, v, vec4f(0.0, 0.0, 0.0, work));
+        put_vertex_data(REFERENCE, v, vec4f());
         return velocity + change;
     }
-    let stiffness = stiffness_felt(pushed);
-    let m = mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0)) + stiffness * inverse_mass;
-    let given = change + (pushed.force * (1.0 / h) - stiffness * velocity) * inverse_mass;
+    let added = stiffness_felt(pushed);
+    let m = mat3x3f(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0)) + added * inverse_mass;
+    let given = change + pushed.force * (inverse_mass / h);
     let a = cross(m[1], m[2]);
     let b = cross(m[2], m[0]);
     let c = cross(m[0], m[1]);
-    let after = velocity + (a * given.x + b * given.y + c * given.z) * (1.0 / dot(m[0], a));
-    let impulse = pushed.force * (1.0 / h) - stiffness * after;
-    work += 0.5 * dot(impulse, velocity + after);
-    put_vertex_data(REFERENCE, v, vec4f(0.0, 0.0, 0.0, work));
-    return after;
+    let gained = (a * given.x + b * given.y + c * given.z) * (1.0 / dot(m[0], a));
+    put_vertex_data(REFERENCE, v, vec4f(pushed.force - added * gained * h, 0.0));
+    return velocity + gained;
 }
 
 // Times h^2, as in the last small step.
 fn contact_load(v: u32) -> vec3f {
-    let pushed = pushed_at(v);
-    return pushed.force - stiffness_felt(pushed) * vertex_data_of(VELOCITIES, v).xyz;
+    return vertex_data_of(REFERENCE, v).xyz;
 }

@@ -3,13 +3,13 @@
 //   T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i + W + owed
 //   v *= sqrt(limit/T_1) where it is exceeded; where more is stored than all of that, the part is at x_n, without speed
 //
-// V: tissue, springs, attachments; W: work of contact on the tissue, impulses times mean speeds of every small step. What
-// contact does is no element of its own: taken where small steps lead it loses energy, never gains any. `owed`: what has gone
-// may come back, or the swing of a symplectic step's energy would brake tissue that is at rest. It stands in `mixture_best` until
-// the next step begins, then in `best_value`, because every workgroup of a part reads it where the first one decides anew.
+// V: tissue, springs, attachments, contact; W: work of tools, their forces times their ways in every small step. Samples keep
+// what tools have given without what contact stores (contact.wgsl). `owed`: what has gone may come back, or the swing of a
+// symplectic step's energy would brake tissue that is at rest. It stands in `mixture_best` until the next step begins, then in
+// `best_value`, because every workgroup of a part reads it where the first one decides anew.
 
-// Sums of a piece: change of the stored energy [J], the same without signs, kinetic energy at both ends of the step, work of loads
-// and contact, samples that tools are near.
+// Sums of a piece: change of the stored energy [J] but for the work of tools, the same without signs, kinetic energy at both ends of
+// the step, work of loads, samples that tools are near.
 const ENERGY_STORED: u32 = 0u;
 const ENERGY_SIZE: u32 = 1u;
 const ENERGY_BEFORE: u32 = 2u;
@@ -28,8 +28,7 @@ fn stored_in(element: u32) -> f32 {
     var way: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
         let v = corners[i];
-        let is_pinned = vertex_data_of(EXTERNAL_FORCES, v).w == 0.0;
-        x[i] = select(vertex_data_of(PREVIOUS, v).xyz, vertex_data_of(TARGETS, v).xyz, is_pinned);
+        x[i] = start_of(v);
         way[i] = points[v].xyz - x[i];
     }
     let tet_lanes = table[TET_LANES_AT];
@@ -66,7 +65,6 @@ fn add_energy_of(v: u32, into: ptr<function, Sums>) {
     (*into)[ENERGY_BEFORE] += 0.5 * mass * dot(before, before);
     (*into)[ENERGY_KINETIC] += 0.5 * mass * dot(velocity, velocity);
     (*into)[ENERGY_WORK] += dot(frame.gravity * mass + on_vertex.xyz, moved) - springs;
-    (*into)[ENERGY_WORK] += vertex_data_of(REFERENCE, v).w;
 }
 
 @compute @workgroup_size(256)
@@ -92,8 +90,14 @@ fn measure_energy(
             let change = stored_in(element);
             sums[ENERGY_STORED] += change;
             sums[ENERGY_SIZE] += abs(change);
-        } else if slots_used(loads[contact_at(element - table[FIRST_SAMPLE_AT])].w) > 0u {
+            continue;
+        }
+        let at = contact_at(element - table[FIRST_SAMPLE_AT]);
+        if slots_used(loads[at].w) > 0u {
+            let given = loads[at + 2u].z;
             sums[ENERGY_NEAR] += 1.0;
+            sums[ENERGY_STORED] -= given;
+            sums[ENERGY_SIZE] += abs(given);
         }
     }
     reduce(sums, 1u, 0u, local);

@@ -33,9 +33,7 @@ impl Recorder<'_> {
                 // Where the step ends replaces the velocities that it began with.
                 self.measure_energy(into);
                 into.push(self.vertices(end, 0));
-                if let Some(Samples { count, .. }) = Samples::known(self.samples) {
-                    let job = Job { count, ..Job::default() };
-                    into.push(self.threads(&kernels::SLIP_CONTACTS, job));
+                if Samples::known(self.samples).is_some() {
                     let limit =
                         self.either(&kernels::LIMIT_ENERGY, &kernels::LIMIT_RECOVERED_ENERGY);
                     let first = self.pieces.first_of_vertices;
@@ -53,9 +51,9 @@ impl Recorder<'_> {
 
     /// How the energy of parts changes in a step, where tissue may meet tools.
     fn measure_energy(&self, into: &mut Vec<Dispatch>) {
-        if Samples::known(self.samples).is_none() {
-            return;
-        }
+        let Some(Samples { count, .. }) = Samples::known(self.samples) else { return };
+        let job = Job { count, ..Job::default() };
+        into.push(self.threads(&kernels::SLIP_CONTACTS, job));
         let Some(extent) = self.recovered else {
             into.push(self.all_pieces(&kernels::MEASURE_ENERGY, 0));
             return;

@@ -22,8 +22,7 @@ const OF_ENERGY: u32 = 2u;
 
 fn place_in_motion(v: u32, h: f32) -> vec3f {
     if job.mode == OF_ENERGY {
-        let is_pinned = vertex_data_of(EXTERNAL_FORCES, v).w == 0.0;
-        return select(vertex_data_of(PREVIOUS, v).xyz, vertex_data_of(TARGETS, v).xyz, is_pinned);
+        return start_of(v);
     }
     if job.mode != BEFORE_MOTION {
         return points[v].xyz;

@@ -171,7 +171,7 @@ kernels! {
         [Tets Points Loads StartStrain Control VertexData Table];
     ADVANCE_TOUCHED = ExplicitTouched "advance_explicit" 64 [Points Loads Control VertexData Table];
     END_TOUCHED = ExplicitTouched "end_explicit" 64 [Points Loads VertexData Table];
-    SLIP_CONTACTS = ExplicitTouched "slip_contacts" 64 [Points Loads Table];
+    SLIP_CONTACTS = ExplicitTouched "slip_contacts" 64 [Points Loads Control VertexData Table];
     LOAD_TOUCHED_RECOVERED = TouchedRecovered "load_forces" 64
         [Tets Points Loads StartStrain Control VertexData Table Recovery];
     ADVANCE_TOUCHED_RECOVERED = TouchedRecovered "advance_explicit" 64

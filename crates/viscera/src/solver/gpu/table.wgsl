@@ -58,6 +58,12 @@ fn vertex_data_of(range: u32, v: u32) -> vec4f {
     return vertex_data[range * table[STRIDE_AT] + v];
 }
 
+// Where the step begins, with its pins moved.
+fn start_of(v: u32) -> vec3f {
+    let is_pinned = vertex_data_of(EXTERNAL_FORCES, v).w == 0.0;
+    return select(vertex_data_of(PREVIOUS, v).xyz, vertex_data_of(TARGETS, v).xyz, is_pinned);
+}
+
 // Sum of what acts on a vertex, in the order of its places.
 fn gather(v: u32) -> vec4f {
     let row = table[OFFSETS_AT] + v;

@@ -14,8 +14,8 @@ use viscera::scalar::rigid::rotation_matrix;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{Elements, Method, SolverSettings};
 use viscera::simulation::{Assembly, Simulation};
+use viscera::solver::Inputs;
 use viscera::solver::gpu::GpuSolver;
-use viscera::solver::{Inputs, Solver};
 use viscera::state::{ContactState, State};
 
 const BOTH: [Elements; 2] = [Elements::Plain, Elements::Recovered];
@@ -54,34 +54,45 @@ fn advance<S: Real>(scene: &mut Scene<S>) -> Vec<Wrench> {
     solver.wrenches().to_vec()
 }
 
-/// While tools press and drag, forces and places are those of many more small steps in double precision, and as far from them as
-/// the processor's own at most by what damping at the tools is: that of a small step, which contact is taken at the end of.
+/// While tools press and drag, forces and places come to those of many more small steps in double precision: by the small steps of
+/// the default they are about as far from them as the processor's own are, by short ones as single precision allows.
 fn assert_agreement(steps: u32) {
+    const USUAL: f64 = 0.8;
+    const SHORT: f64 = 0.1;
     for elements in BOTH {
-        let [mut truth, mut cpu] =
-            [0.2, 0.8].map(|safety| pressed::<f64>(&explicit(elements, safety)));
-        let mut here = pressed::<f32>(&explicit(elements, 0.8));
-        let mut gpu = OnDevice::new(&here);
+        let mut truth = pressed::<f64>(&explicit(elements, 0.5 * SHORT));
+        let mut cpu = pressed::<f64>(&explicit(elements, USUAL));
+        let mut inputs = [USUAL, SHORT].map(|safety| pressed::<f32>(&explicit(elements, safety)));
+        let mut devices = inputs.each_ref().map(OnDevice::new);
         for step in 1..=steps {
-            let [expected, of_cpu] = [&mut truth, &mut cpu].map(advance);
-            lead(f64::from(step) * here.dt, &mut here.inputs.tools);
-            let found = gpu.step(&here);
+            let expected = advance(&mut truth);
+            let of_cpu = advance(&mut cpu);
             let x = &truth.state.positions;
-            let [apart, usual] =
-                [largest(&gpu.state.positions, x), largest(&cpu.state.positions, x)];
-            let [forces, usual_forces] = [off(&found, &expected), off(&of_cpu, &expected)];
+            let [[usual_place, usual_force], [place, force]] = [0, 1].map(|i| {
+                let (scene, device) = (&mut inputs[i], &mut devices[i]);
+                lead(f64::from(step) * scene.dt, &mut scene.inputs.tools);
+                let found = device.step(scene);
+                for (found, expected) in found.iter().zip(&expected) {
+                    let more = found.touches.abs_diff(expected.touches);
+                    assert!(more <= 2, "{found:?}, {expected:?}");
+                    assert_eq!((found.left_out, found.has_jumped), (0, false));
+                }
+                [largest(&device.state.positions, x), off(&found, &expected)]
+            });
+            let of_cpu = [largest(&cpu.state.positions, x), off(&of_cpu, &expected)];
             println!(
-                "{elements:?} {step}: {apart:.1e} m, {forces:.1e}; {usual:.1e} m, {usual_forces:.1e}"
+                "{elements:?} {step}: {usual_place:.1e} m, {usual_force:.1e}; CPU {:.1e} m, {:.1e}; \
+                 short {place:.1e} m, {force:.1e}",
+                of_cpu[0], of_cpu[1]
             );
-            // Of tissue that moves by 6 mm: where it is dragged, contact that is taken at the end of small steps damps it.
-            assert!(apart < 2.0 * usual + 2e-4, "{elements:?} {step}: {apart:e} m, {usual:e} m");
-            assert!(forces < 2.0 * usual_forces + 2e-2, "{elements:?} {step}: {forces:e}");
-            for (found, expected) in found.iter().zip(&expected) {
-                assert!(found.touches.abs_diff(expected.touches) <= 2, "{found:?}, {expected:?}");
-                assert_eq!((found.left_out, found.has_jumped), (0, false));
-            }
+            // Tissue moves by 6 mm.
+            assert!(usual_place < 1.5 * of_cpu[0] + 1e-5, "{elements:?} {step}: {usual_place:e} m");
+            assert!(usual_force < 1.5 * of_cpu[1] + 5e-4, "{elements:?} {step}: {usual_force:e}");
+            assert!(place < 3e-7 && force < 1.5e-4, "{elements:?} {step}: {place:e} m, {force:e}");
         }
-        assert_eq!(gpu.gpu.rejected_steps().expect("a device"), 0);
+        for device in devices {
+            assert_eq!(device.gpu.rejected_steps().expect("a device"), 0);
+        }
     }
 }
 
@@ -165,8 +176,12 @@ struct Shaken {
     rejected: u64,
 }
 
-fn shaken(elements: Elements, shake: f64, speed: f64, on_cpu: bool) -> Shaken {
-    let dt = 1.0 / 600.0;
+/// Steps in a hundredth of a second, in which jaws go from place to place.
+const STEPS: u32 = 24;
+
+fn shaken(elements: Elements, shake: f64, speed: f64) -> Shaken {
+    // Forces at the ends of longer steps do not say what jaws give that are as fast: by 1/600 s a fifth of the energy is missing.
+    let dt = 1.0 / f64::from(100 * STEPS);
     let mut plan = Plan::new(3, false);
     // Nothing damps but what contact loses.
     plan.block.tissue[2] = 0.0;
@@ -178,7 +193,6 @@ fn shaken(elements: Elements, shake: f64, speed: f64, on_cpu: bool) -> Shaken {
     let settings = explicit(elements, 0.8);
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     gpu.write(&model, &state).expect("a legal state");
-    let mut cpu = Solver::new(&model, &settings);
     let outside = Outside::new::<f32>(&plan.block.mesh, GRASPED[0], GRASPED[1], 1060.0);
     let outside = match elements {
         Elements::Recovered => outside.of_recovered(&plan.block.material()),
@@ -193,21 +207,16 @@ fn shaken(elements: Elements, shake: f64, speed: f64, on_cpu: bool) -> Shaken {
     for step in 1..=(1.7 / speed / dt).round() as u32 {
         let time = f64::from(step) * dt * speed;
         plan.act(time, &mut inputs.tools);
-        let share = f64::from(step % 6) / 6.0;
+        let share = f64::from(step % STEPS) / f64::from(STEPS);
         for (tool, [from, to]) in inputs.tools.iter_mut().zip(&mut places) {
-            if step % 6 == 0 {
+            if step % STEPS == 0 {
                 (*from, *to) = (*to, random.vector(if time < 1.2 { shake } else { 0.0 }));
             }
             tool.pose.translation += *from + (*to - *from) * share;
         }
-        if on_cpu {
-            cpu.step(&model, &mut state, &inputs, dt).expect("a legal step");
-            account.add(&inputs.tools, cpu.wrenches());
-        } else {
-            gpu.step(&model, &inputs, dt).expect("a legal step");
-            gpu.read_frame(&model, &mut state).expect("a device");
-            account.add(&inputs.tools, gpu.wrenches());
-        }
+        gpu.step(&model, &inputs, dt).expect("a legal step");
+        gpu.read_frame(&model, &mut state).expect("a device");
+        account.add(&inputs.tools, gpu.wrenches());
         let energy = outside.mechanical(&state, dt);
         found.peak = found.peak.max(energy.value);
         found.gain = found.gain.max(energy.value - energy.noise - account.work);
@@ -225,19 +234,19 @@ fn shaken(elements: Elements, shake: f64, speed: f64, on_cpu: bool) -> Shaken {
     found
 }
 
-/// Places of the jaws are a hundredth of a second apart, random and up to 3 mm aside: 0.3 m/s.
+/// Random places of the jaws up to 3 mm aside: 0.3 m/s.
+fn assert_nothing_is_made(elements: Elements, shake: f64, speed: f64) {
+    let Shaken { peak, gain, rejected } = shaken(elements, shake, speed);
+    println!(
+        "{elements:?}, {shake}: {:.1e} of {peak:.1e} J made, {rejected} rejected",
+        gain / peak
+    );
+    assert!(gain < 1e-3 * peak && rejected < 5, "{elements:?}: {gain:e} of {peak:e} J");
+}
+
 #[test]
 fn jaws_that_shake_make_no_energy_in_explicit_steps() {
-    for elements in BOTH {
-        // Forces at the ends of steps do not say exactly what jaws give that are as fast: the processor's are off as well, by more.
-        let known = shaken(elements, 3e-3, 10.0, true);
-        let Shaken { peak, gain, rejected } = shaken(elements, 3e-3, 10.0, false);
-        let [share, usual] = [gain / peak, known.gain / known.peak];
-        println!(
-            "{elements:?}: {peak:.1e} J, {share:.1e} of it made, {rejected} rejected, CPU {usual:.1e}"
-        );
-        assert!(share < usual + 1e-3 && rejected < 5, "{elements:?}: {gain:e} of {peak:e} J");
-    }
+    BOTH.into_iter().for_each(|elements| assert_nothing_is_made(elements, 3e-3, 10.0));
 }
 
 #[test]
@@ -245,9 +254,7 @@ fn jaws_that_shake_make_no_energy_in_explicit_steps() {
 fn jaws_that_shake_make_no_energy_in_explicit_steps_at_length() {
     for elements in BOTH {
         for shake in [0.0, 1e-3, 3e-3, 6e-3] {
-            let Shaken { peak, gain, rejected } = shaken(elements, shake, 4.0, false);
-            println!("{elements:?}, {shake}: {:.1e} of {peak:.1e} J, {rejected}", gain / peak);
-            assert!(gain < 0.02 * peak && rejected < 10, "{elements:?}: {gain:e} of {peak:e} J");
+            assert_nothing_is_made(elements, shake, 4.0);
         }
     }
 }

@@ -169,11 +169,10 @@ table! {
         w(VertexData, ROW, Vertex),
         r(Control, WORD, Never),
         r(Table, WORD, Vertex),
-        // Its samples, and the work of what presses on them.
+        // Its samples, and their force.
         again(Loads, ROW, SampleCorner),
         r(Table, 2 * WORD, SampleCorner),
         r(Table, WORD, SampleVertex),
-        r(VertexData, ROW, Vertex),
         w(VertexData, ROW, Vertex),
     ];
     ADVANCE_TOUCHED_RECOVERED, 20 each RingEntry: [
@@ -189,35 +188,31 @@ table! {
         again(Loads, ROW, SampleCorner),
         r(Table, 2 * WORD, SampleCorner),
         r(Table, WORD, SampleVertex),
-        r(VertexData, ROW, Vertex),
         w(VertexData, ROW, Vertex),
     ];
     END_TOUCHED, 40 each Vertex: [
         r(Points, ROW, Vertex),
         r(Loads, ROW, Corner),
-        r(VertexData, 4 * ROW, Vertex),
+        r(VertexData, 5 * ROW, Vertex),
         w(VertexData, ROW, Vertex),
         r(Table, WORD, Vertex),
-        again(Loads, ROW, SampleCorner),
-        r(Table, 2 * WORD, SampleCorner),
-        r(Table, WORD, SampleVertex),
     ];
     END_TOUCHED_RECOVERED, 20 each RingEntry: [
         r(Points, ROW, Vertex),
         r(Loads, ROW, PlainCorner),
-        r(VertexData, 4 * ROW, Vertex),
+        r(VertexData, 5 * ROW, Vertex),
         w(VertexData, ROW, Vertex),
         r(Table, 2 * WORD, Vertex),
         r(Table, ROW, RingEntry),
         r(Recovery, MATRIX, Place).by(RingEntry),
-        again(Loads, ROW, SampleCorner),
-        r(Table, 2 * WORD, SampleCorner),
-        r(Table, WORD, SampleVertex),
     ];
     SLIP_CONTACTS, 20 each Sample: [
         r(Points, ROW, Vertex).by(SampleCorner),
         r(Loads, ROW, Sample),
         r(Table, 9 * WORD, Sample),
+        // Of small steps.
+        r(VertexData, ROW, Never),
+        r(Control, WORD, Never),
     ];
     MEASURE_ENERGY, 250 each Tet: [
         r(Tets, TET, Tet),
