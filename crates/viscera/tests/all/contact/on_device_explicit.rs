@@ -79,6 +79,11 @@ fn assert_agreement(steps: u32) {
                 }
                 [largest(&device.state.positions, x), off(&found, &expected)]
             });
+            // Accelerations are those in the middle of the last small step.
+            for (scene, device) in inputs.iter().zip(&devices) {
+                let residual = device.residual(scene);
+                assert!(residual < 2e-2, "{elements:?} {step}: {residual:e}");
+            }
             let of_cpu = [largest(&cpu.state.positions, x), off(&of_cpu, &expected)];
             println!(
                 "{elements:?} {step}: {usual_place:.1e} m, {usual_force:.1e}; CPU {:.1e} m, {:.1e}; \
@@ -105,6 +110,31 @@ fn explicit_forces_and_places_are_the_processors() {
 #[test]
 fn portable_explicit_contact_is_the_processors() {
     assert_agreement(2);
+}
+
+/// Contact that is a hundred times as stiff, whatever small steps are by tissue alone: nothing is rejected, forces are those of the
+/// processor, which makes small steps as short as that needs.
+#[test]
+fn contact_is_as_stiff_as_it_likes_in_explicit_steps() {
+    for elements in BOTH {
+        let mut truth = pressed::<f64>(&explicit(elements, 0.8));
+        let mut here = pressed::<f32>(&explicit(elements, 0.8));
+        truth.inputs.tools.iter_mut().for_each(|tool| tool.law.stiffness *= 100.0);
+        here.inputs.tools.iter_mut().for_each(|tool| tool.law.stiffness *= 100.0);
+        let mut gpu = OnDevice::new(&here);
+        for step in 1..=8 {
+            let expected = advance(&mut truth);
+            lead(f64::from(step) * here.dt, &mut here.inputs.tools);
+            let found = gpu.step(&here);
+            let apart = largest(&gpu.state.positions, &truth.state.positions);
+            let forces = off(&found, &expected);
+            println!("{elements:?} {step}: {apart:.1e} m, {forces:.1e}");
+            // Tools come at 0.08 m/s: the first forces are those of waves that start.
+            assert!(apart < 3e-5, "{elements:?} {step}: {apart:e} m");
+            assert!(forces < if step == 1 { 0.1 } else { 0.02 }, "{elements:?} {step}: {forces:e}");
+        }
+        assert_eq!(gpu.gpu.rejected_steps().expect("a device"), 0);
+    }
 }
 
 /// Two runs have the same bits, whatever memory held before.
