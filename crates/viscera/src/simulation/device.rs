@@ -78,6 +78,16 @@ pub(super) trait DeviceSolver<S>: Debug + Send {
     /// Multipliers from the places where vertices are.
     fn restart(&mut self, model: &Model<S>, inputs: &Inputs<S>, dt: f64) -> Result<(), StepError>;
 
+    /// Another solver of the same model on the same device, in this state.
+    fn second(
+        &self,
+        model: &Model<S>,
+        state: &State<S>,
+    ) -> Result<Box<dyn DeviceSolver<S>>, FrameError>;
+
+    /// Goes on from where the other is of which it is the second, while tools touch nothing in either. Does not wait.
+    fn follow(&mut self, other: &dyn DeviceSolver<S>);
+
     #[cfg(feature = "gpu")]
     fn solver(&self) -> &GpuSolver;
 }

@@ -103,6 +103,18 @@ impl DeviceSolver<f32> for GpuSolver {
         GpuSolver::write_velocities(self, velocities);
     }
 
+    fn second(
+        &self,
+        model: &Model<f32>,
+        state: &State<f32>,
+    ) -> Result<Box<dyn DeviceSolver<f32>>, FrameError> {
+        Ok(Box::new(GpuSolver::second(self, model, state)?))
+    }
+
+    fn follow(&mut self, other: &dyn DeviceSolver<f32>) {
+        GpuSolver::follow(self, other.solver());
+    }
+
     fn solver(&self) -> &GpuSolver {
         self
     }

@@ -249,7 +249,7 @@ impl<S: Real> Simulation<S> {
             device.write(&self.model, &self.state);
         }
         if let Some(shadow) = &mut self.shadow {
-            renumber(shadow.contact_mut(), &places, &parts);
+            shadow.change_contact(&self.model, |contact| renumber(contact, &places, &parts));
         }
         if were_any != are_any {
             self.choose_substeps();

@@ -2,7 +2,7 @@
 //! browsers forbid.
 
 use super::error::FrameError;
-use super::shadowed::Shadowed;
+use super::shadowed::{ON_DEVICE, Shadowed, touch_nothing};
 use super::{Simulation, substep_dt};
 use crate::scalar::Real;
 use crate::solver::{FrameReading, Inputs};
@@ -85,17 +85,39 @@ impl<S: Real> Simulation<S> {
 
     /// The run beside this one goes on from where this one is where it does not exist yet, or where nothing touched anything
     /// in either: what the past has left is gone then.
-    fn call_shadow(&mut self) {
-        let is_wanted = self.scene.output.force_error
-            && !self.assembly.tools.is_empty()
-            && !self.is_on_device();
-        let Self { shadow, state, model, solver, inputs, .. } = self;
-        match shadow {
-            _ if !is_wanted => *shadow = None,
-            None => *shadow = Some(Shadowed::new(model, solver, state, inputs)),
-            Some(shadow) if state.contact.touches.is_empty() => shadow.follow(state),
-            Some(_) => {}
+    fn call_shadow(&mut self) -> Result<(), FrameError> {
+        let on_device = self.is_on_device();
+        let is_asked_for = self.scene.output.force_error.unwrap_or(!on_device);
+        let can = !on_device || ON_DEVICE;
+        if !is_asked_for || !can || self.assembly.tools.is_empty() {
+            self.shadow = None;
+            return Ok(());
         }
+        let is_beside = |shadow: &Shadowed<S>| shadow.is_on_device() == on_device;
+        match (&mut self.shadow, self.backend.device()) {
+            (Some(shadow), Some(device)) if is_beside(shadow) => {
+                if !touch_nothing(device.wrenches()) {
+                    return Ok(());
+                }
+                if !shadow.is_gone() {
+                    shadow.follow(&self.state, Some(device));
+                    return Ok(());
+                }
+            }
+            (Some(shadow), None) if is_beside(shadow) => {
+                if self.state.contact.touches.is_empty() {
+                    shadow.follow(&self.state, None);
+                }
+                return Ok(());
+            }
+            _ => {}
+        }
+        let (model, inputs) = (&self.model, &self.inputs);
+        self.shadow = Some(match self.backend.device() {
+            Some(device) => Shadowed::on_device(device, model, self.whole_state(), inputs)?,
+            None => Shadowed::new(model, &self.solver, &self.state, inputs),
+        });
+        Ok(())
     }
 
     /// The substeps of a frame.
@@ -110,7 +132,7 @@ impl<S: Real> Simulation<S> {
         let substeps = substeps * backend.times_for_contact(state, inputs, of_frame);
         let dt = substep_dt(&self.scene, substeps);
         self.divided = substeps;
-        self.call_shadow();
+        self.call_shadow()?;
         let Self { scene, assembly, taken, instruments, model, state, inputs, backend, .. } = self;
         self.rejected_before = backend.rejected_steps();
         let act = |substep: u32, count: u32, inputs: &mut Inputs<S>| {
@@ -154,6 +176,9 @@ impl<S: Real> Simulation<S> {
         self.frame += 1;
         self.stepped = true;
         self.wrenches = None;
+        if let Some(shadow) = &mut self.shadow {
+            shadow.arrive();
+        }
         self.lead_jaws();
         if !self.state.is_finite() || self.backend.is_beyond_numbers() {
             return Err(self.diverged());
@@ -164,7 +189,7 @@ impl<S: Real> Simulation<S> {
                 *velocity = *velocity * S::from_f64(factor);
             }
             if let Some(shadow) = &mut self.shadow {
-                shadow.slow_down(factor);
+                shadow.slow_down(&self.model, factor);
             }
             if let Some(device) = self.backend.device_mut() {
                 device.write_velocities(&self.state.velocities);

@@ -42,6 +42,7 @@ mod reading;
 pub(in crate::solver) mod record;
 mod report;
 mod ring;
+mod second;
 mod sent;
 mod shared;
 mod shown;
