@@ -4,6 +4,7 @@ use std::any::Any;
 
 use super::device::{Backend, DeviceSolver, Engine};
 use super::error::{FrameError, SimulationError};
+use super::shadowed::ON_DEVICE;
 use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::model::Model;
@@ -108,11 +109,16 @@ impl DeviceSolver<f32> for GpuSolver {
         model: &Model<f32>,
         state: &State<f32>,
     ) -> Result<Box<dyn DeviceSolver<f32>>, FrameError> {
-        Ok(Box::new(GpuSolver::second(self, model, state)?))
+        match ON_DEVICE {
+            Some(_) => Ok(Box::new(GpuSolver::second(self, model, state)?)),
+            None => Err(GpuError::OnlyOnCpu.into()),
+        }
     }
 
     fn follow(&mut self, other: &dyn DeviceSolver<f32>) {
-        GpuSolver::follow(self, other.solver());
+        if ON_DEVICE.is_some() {
+            GpuSolver::follow(self, other.solver());
+        }
     }
 
     fn solver(&self) -> &GpuSolver {

@@ -88,7 +88,7 @@ impl<S: Real> Simulation<S> {
     fn call_shadow(&mut self) -> Result<(), FrameError> {
         let on_device = self.is_on_device();
         let is_asked_for = self.scene.output.force_error.unwrap_or(!on_device);
-        let can = !on_device || ON_DEVICE;
+        let can = !on_device || ON_DEVICE.is_some();
         if !is_asked_for || !can || self.assembly.tools.is_empty() {
             self.shadow = None;
             return Ok(());
@@ -113,9 +113,11 @@ impl<S: Real> Simulation<S> {
             _ => {}
         }
         let (model, inputs) = (&self.model, &self.inputs);
-        self.shadow = Some(match self.backend.device() {
-            Some(device) => Shadowed::on_device(device, model, self.whole_state(), inputs)?,
-            None => Shadowed::new(model, &self.solver, &self.state, inputs),
+        self.shadow = Some(match (self.backend.device(), ON_DEVICE) {
+            (Some(device), Some(possible)) => {
+                Shadowed::on_device(possible, device, model, self.whole_state(), inputs)?
+            }
+            _ => Shadowed::new(model, &self.solver, &self.state, inputs),
         });
         Ok(())
     }

@@ -11,8 +11,17 @@ use crate::settings::{SolverSettings, Threads};
 use crate::solver::{Inputs, Shadow};
 use crate::state::{ContactState, State};
 
-/// Whether a run on a device can have one. Pages leave it out, whose size is limited.
-pub(super) const ON_DEVICE: bool = cfg!(all(feature = "gpu", not(target_arch = "wasm32")));
+/// What a run on a device needs to have one: nothing. Pages leave it out, whose size is limited: there no such value exists, and
+/// no code that needs one.
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+pub(super) type Possible = ();
+#[cfg(not(all(feature = "gpu", not(target_arch = "wasm32"))))]
+pub(super) type Possible = std::convert::Infallible;
+
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+pub(super) const ON_DEVICE: Option<Possible> = Some(());
+#[cfg(not(all(feature = "gpu", not(target_arch = "wasm32"))))]
+pub(super) const ON_DEVICE: Option<Possible> = None;
 
 /// A second run, and what it is given.
 #[derive(Debug)]
@@ -37,6 +46,7 @@ enum Runner<S> {
         solver: Box<dyn DeviceSolver<S>>,
         /// What moves, where it has to be read.
         state: Box<State<S>>,
+        _possible: Possible,
     },
 }
 
@@ -56,13 +66,14 @@ impl<S: Real> Shadowed<S> {
 
     /// Beside a run of a device that is in this state.
     pub fn on_device(
+        possible: Possible,
         device: &dyn DeviceSolver<S>,
         model: &Model<S>,
         state: State<S>,
         inputs: &Inputs<S>,
     ) -> Result<Self, FrameError> {
         let solver = device.second(model, &state)?;
-        Ok(Self::by(Runner::Device { solver, state: Box::new(state) }, inputs))
+        Ok(Self::by(Runner::Device { solver, state: Box::new(state), _possible: possible }, inputs))
     }
 
     fn by(runner: Runner<S>, inputs: &Inputs<S>) -> Self {
@@ -102,7 +113,7 @@ impl<S: Real> Shadowed<S> {
     pub fn change_contact(&mut self, model: &Model<S>, change: impl FnOnce(&mut ContactState)) {
         match &mut self.runner {
             Runner::Cpu { shadow, .. } => change(&mut shadow.state_mut().contact),
-            Runner::Device { solver, state } => {
+            Runner::Device { solver, state, .. } => {
                 let mut read = || {
                     solver.read(model, state)?;
                     solver.contact(model, state)
@@ -183,7 +194,7 @@ impl<S: Real> Shadowed<S> {
         };
         match &mut self.runner {
             Runner::Cpu { shadow, .. } => slow(&mut shadow.state_mut().velocities),
-            Runner::Device { solver, state } => {
+            Runner::Device { solver, state, .. } => {
                 self.is_lost |= solver.read(model, state).is_err();
                 slow(&mut state.velocities);
                 solver.write_velocities(&state.velocities);
