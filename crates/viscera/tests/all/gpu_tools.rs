@@ -2,7 +2,7 @@
 
 use crate::common::device::{device, own_device};
 use viscera::scalar::rigid::RigidTransform;
-use viscera::scalar::vec3;
+use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{Scene, read_tray};
 use viscera::simulation::{Assembly, Simulation, ToolForce};
 use viscera::solver::FrameReading;
@@ -92,12 +92,9 @@ fn forces_are_said_to_be_off_by_what_the_processor_says() {
     let text = SCENE.replace("[5, 5, 3]", "[3, 3, 2]");
     let shared = [("body.block.material.viscosity", "2 ms"), ("world.gravity", "9.81 m/s^2")];
     let xpbd = [("solver.method", "xpbd"), ("solver.substeps", "4"), ("solver.iterations", "8")];
-    // Small steps of explicit ones have other lengths on a device [N].
-    for (settings, floor) in [
-        (&[("solver.method", "quasi_newton")][..], 1e-4),
-        (&xpbd, 1e-4),
-        (&[("solver.method", "explicit")], 5e-3),
-    ] {
+    let explicit = [("solver.method", "explicit")];
+    for settings in [&[("solver.method", "quasi_newton")][..], &xpbd, &explicit] {
+        let is_explicit = settings == explicit;
         let settings = |more: &[_]| parsed_text(&text, &[settings, &shared, more].concat());
         let (scene, assembly) = settings(&[("solver.device", "cpu")]);
         let mut cpu = Simulation::<f32>::new(scene, assembly).expect("a simulation");
@@ -118,7 +115,13 @@ fn forces_are_said_to_be_off_by_what_the_processor_says() {
             let [here, there, bare] = [&cpu, &gpu, &alone].map(|run| run.tool_forces()[0].clone());
             assert_eq!((there.force, bare.error), (bare.force, None), "{there}, {bare}");
             let [said, expected] = [&there, &here].map(|tool| tool.error.expect("asked for"));
-            assert!((said - expected).abs() < 0.1 * expected + floor, "{there} and {here}");
+            // Explicit steps take contact in another way there, which is off by less (docs/gpu.md).
+            let size = Vec3::<f64>::from_f64(there.force).length();
+            let (least, most) = match is_explicit {
+                true => (0.99e-3 * size, 2.0 * expected + 2e-3 * size),
+                false => (0.9 * expected - 1e-4, 1.1 * expected + 1e-4),
+            };
+            assert!((least..=most).contains(&said), "{there} and {here}");
         }
     }
 }
