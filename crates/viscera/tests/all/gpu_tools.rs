@@ -126,6 +126,29 @@ fn forces_are_said_to_be_off_by_what_the_processor_says() {
     }
 }
 
+/// Soft tissue swings for a while before it is touched. The second run, whose longer steps make it swing otherwise, has gone on
+/// from the first until then.
+#[test]
+fn a_second_run_has_no_past_before_anything_is_touched() {
+    let text = SCENE.replace("[5, 5, 3]", "[3, 3, 2]").replace("10 kPa", "1 kPa");
+    let text = text.replace("23 mm", "27 mm").replace("-5 mm", "-11 mm");
+    let settings = [("world.gravity", "9.81 m/s^2"), ("output.force_error", "true")];
+    let (scene, assembly) =
+        parsed_text(&text, &[&settings[..], &[("solver.device", "cpu")]].concat());
+    let mut cpu = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+    let (scene, assembly) = parsed_text(&text, &settings);
+    let mut gpu = Simulation::<f32>::on_device(scene, assembly, device()).expect("a simulation");
+    for _ in 0..8 {
+        advance(&mut cpu, 1);
+        advance(&mut gpu, 1);
+        let [here, there] = [&cpu, &gpu].map(|run| run.tool_forces()[0].clone());
+        let [expected, said] = [&here, &there].map(|tool| tool.error.expect("asked for"));
+        assert!((said - expected).abs() < 0.1 * expected + 1e-4, "{there} and {here}");
+    }
+    let there = &gpu.tool_forces()[0];
+    assert!(there.touches > 0, "{there}");
+}
+
 /// The same by sweeps.
 #[test]
 fn sweeps_report_what_the_processors_do() {
