@@ -203,16 +203,17 @@ fn tools_come_and_go_on_a_device() {
         assert!(there.force[2] > 0.02, "{there}");
         assert!(apart(here, there) < 0.05, "{here} and {there}");
     }
+    // The ball goes: the probe is the first part of a tool then, and what it has touched stays.
     for run in [&mut cpu, &mut gpu] {
-        run.put_away(1).expect("the probe");
+        run.put_away(0).expect("the ball");
         advance(run, 4);
-        assert_eq!(run.tool_forces()[1].touches, 0);
+        assert_eq!(run.tool_forces()[0].touches, 0);
     }
-    let (here, there) = (&cpu.tool_forces()[0], &gpu.tool_forces()[0]);
-    assert!(apart(here, there) < 0.05, "{here} and {there}");
-    // The second run has seen it come and go as well, and what it had touched stayed.
-    let [here, there] = [here, there].map(|tool| tool.error.expect("asked for"));
-    assert!((here - there).abs() < 0.1 * here, "{here} and {there} N");
+    let (here, there) = (&cpu.tool_forces()[1], &gpu.tool_forces()[1]);
+    assert!(there.force[2] > 0.02 && apart(here, there) < 0.05, "{here} and {there}");
+    // The second run has seen it go as well.
+    let [expected, said] = [here, there].map(|tool| tool.error.expect("asked for"));
+    assert!((said - expected).abs() < 0.15 * expected, "{here} and {there}");
 }
 
 /// A moment that was kept is gone on from within the error of a solve; friction's anchors are part of it.
