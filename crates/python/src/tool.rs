@@ -103,7 +103,7 @@ impl Tool {
     }
 
     /// What force [N] and torque [N m] may be off by because substeps have a length and sweeps an end; None where the scene
-    /// does not ask for it (`output.force_error`).
+    /// does not ask for it (`output.force_error`), as on a graphics processor where that is unset.
     #[getter]
     fn wrench_error(&self) -> PyResult<Option<(f64, f64)>> {
         let ToolForce { error, torque_error, .. } = self.reported()?;

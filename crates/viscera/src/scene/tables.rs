@@ -131,8 +131,8 @@ settings_table! {
         /// What colours of pictures show.
         colors: PictureColors = (PictureColors::Auto), one_of::<PictureColors>();
         /// Tell how far forces on tools may be off: the scene runs a second time beside, in half as many substeps, by a thread
-        /// of its own where `solver.threads` is not 1. Where unset the CPU tells it, and a graphics processor, which takes half
-        /// as long again for it, does not.
+        /// of its own where `solver.threads` is not 1. Unset, a run on the CPU does so, and one on a graphics processor, which
+        /// takes half as long again for it, does not; in a browser that never does.
         force_error: Option<bool> = None, optional(truth());
         /// Direction from the body towards the camera.
         view_from: Vec3<f64> = (vec3(0.36, -0.8, 0.48)), direction();

@@ -87,33 +87,30 @@ impl<S: Real> Simulation<S> {
     /// in either: what the past has left is gone then.
     fn call_shadow(&mut self) -> Result<(), FrameError> {
         let on_device = self.is_on_device();
-        let is_asked_for = self.scene.output.force_error.unwrap_or(!on_device);
-        let can = !on_device || ON_DEVICE.is_some();
-        if !is_asked_for || !can || self.assembly.tools.is_empty() {
+        let is_wanted = self.scene.output.force_error.unwrap_or(!on_device)
+            && !self.assembly.tools.is_empty()
+            && (!on_device || ON_DEVICE.is_some());
+        if !is_wanted {
             self.shadow = None;
             return Ok(());
         }
-        let is_beside = |shadow: &Shadowed<S>| shadow.is_on_device() == on_device;
-        match (&mut self.shadow, self.backend.device()) {
-            (Some(shadow), Some(device)) if is_beside(shadow) => {
-                if !touch_nothing(device.wrenches()) {
-                    return Ok(());
-                }
-                if !shadow.is_gone() {
-                    shadow.follow(&self.state, Some(device));
-                    return Ok(());
-                }
-            }
-            (Some(shadow), None) if is_beside(shadow) => {
-                if self.state.contact.touches.is_empty() {
-                    shadow.follow(&self.state, None);
-                }
+        let device = self.backend.device();
+        let is_free = match device {
+            Some(device) => touch_nothing(device.wrenches()),
+            None => self.state.contact.touches.is_empty(),
+        };
+        let is_beside = |shadow: &&mut Shadowed<S>| shadow.is_on_device() == on_device;
+        if let Some(shadow) = self.shadow.as_mut().filter(is_beside) {
+            if !is_free {
                 return Ok(());
             }
-            _ => {}
+            if !shadow.is_gone() {
+                shadow.follow(&self.state, device);
+                return Ok(());
+            }
         }
         let (model, inputs) = (&self.model, &self.inputs);
-        self.shadow = Some(match (self.backend.device(), ON_DEVICE) {
+        self.shadow = Some(match (device, ON_DEVICE) {
             (Some(device), Some(possible)) => {
                 Shadowed::on_device(possible, device, model, self.whole_state(), inputs)?
             }

@@ -58,7 +58,7 @@ fn advance<S: Real>(scene: &mut Scene<S>) -> Vec<Wrench> {
 /// the default they are about as far from them as the processor's own are, by short ones as single precision allows.
 fn assert_agreement(steps: u32) {
     const USUAL: f64 = 0.8;
-    const SHORT: f64 = 0.1;
+    const SHORT: f64 = 0.07;
     for elements in BOTH {
         let mut truth = pressed::<f64>(&explicit(elements, 0.5 * SHORT));
         let mut cpu = pressed::<f64>(&explicit(elements, USUAL));
@@ -90,10 +90,10 @@ fn assert_agreement(steps: u32) {
                  short {place:.1e} m, {force:.1e}",
                 of_cpu[0], of_cpu[1]
             );
-            // Tissue moves by 6 mm.
+            // Of the 6 mm that tissue moves by a ten-thousandth, as of forces.
             assert!(usual_place < 1.5 * of_cpu[0] + 1e-5, "{elements:?} {step}: {usual_place:e} m");
             assert!(usual_force < 1.5 * of_cpu[1] + 5e-4, "{elements:?} {step}: {usual_force:e}");
-            assert!(place < 3e-7 && force < 1.5e-4, "{elements:?} {step}: {place:e} m, {force:e}");
+            assert!(place < 6e-7 && force < 1e-4, "{elements:?} {step}: {place:e} m, {force:e}");
         }
         for device in devices {
             assert_eq!(device.gpu.rejected_steps().expect("a device"), 0);
